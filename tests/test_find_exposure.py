@@ -82,6 +82,7 @@ def test_a_run_at_the_found_velocity_has_this_exposure(tmp_path: Path) -> None:
     assert found["found_energy"][0] == pytest.approx(0.5 * 1.8096e-4 * velocity**2, rel=1e-4)
 
 
+@pytest.mark.long
 def test_at_the_ends_of_the_energies_the_band_of_the_exposure_ends_at_the_level() -> None:
     found = fecm.sweep(DECK, until={"exposure": 1.0})
     low, energy, high = (
@@ -98,6 +99,7 @@ def test_at_the_ends_of_the_energies_the_band_of_the_exposure_ends_at_the_level(
 
 
 @pytest.mark.parametrize(("radius", "noted"), [("0.2", False), ("0.02", True)])
+@pytest.mark.few(1)  # of 2, 0.7 s each
 def test_a_note_says_where_the_mesh_decides_the_energy(
     radius: str, noted: bool, tmp_path: Path
 ) -> None:
@@ -112,6 +114,7 @@ def test_a_note_says_where_the_mesh_decides_the_energy(
     assert (share < 0.75) == noted
 
 
+@pytest.mark.long
 def test_each_case_of_a_sweep_has_its_velocity() -> None:
     together = fecm.sweep(DECK, {"layup": ["[0/90]", "[0/0]"]}, until={"exposure": 0.5})
     alone = fecm.sweep(DECK, {"layup": ["[0/0]"]}, until={"exposure": 0.5})
@@ -123,6 +126,7 @@ def test_each_case_of_a_sweep_has_its_velocity() -> None:
         assert np.max(exposures) == pytest.approx(0.5, rel=2e-5)
 
 
+@pytest.mark.long
 def test_a_run_that_leaves_the_exposure_open_is_repeated_longer() -> None:
     short = fecm.sweep(failing(steps=40), until={"exposure": 1.0})
     (steps,) = short.steps
@@ -133,6 +137,7 @@ def test_a_run_that_leaves_the_exposure_open_is_repeated_longer() -> None:
     )
 
 
+@pytest.mark.long
 def test_few_evaluations_and_short_runs_find_no_velocity() -> None:
     rare = fecm.sweep(failing(every=40, steps=400), until={"exposure": 1.0})
     assert "FAIL was evaluated" in rare["status"][0]

@@ -152,6 +152,7 @@ def test_no_plate_exceeds_the_deflection_that_its_energy_allows() -> None:
 
 
 @pytest.mark.parametrize("mass", [4e-6, 4e-5, 2e-3])
+@pytest.mark.few(1)  # of 3, 0.7 s each
 def test_a_peak_that_is_known_at_some_end_is_that_of_the_whole_run(mass: float) -> None:
     deck = soft().with_(mass=mass)
     run = fecm.run_one(deck)
@@ -195,6 +196,7 @@ def test_a_free_plate_moves_under_an_impulse_as_a_rigid_body() -> None:
 # What it decides ---------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_no_interval_of_a_probability_excludes_that_of_whole_runs() -> None:
     whole = swept().random
     assert whole is not None
@@ -219,6 +221,7 @@ def test_bounds_hold_whatever_the_open_draws_are() -> None:
     assert high == max(upper for _, upper in every)
 
 
+@pytest.mark.long
 def test_a_velocity_is_found_whatever_the_duration_of_the_deck() -> None:
     energies = []
     for duration in (3e-3, WHOLE):
@@ -235,6 +238,7 @@ def test_a_search_ends_where_no_run_is_long_enough() -> None:
     assert found["validity"].tolist() == ["failed"]
 
 
+@pytest.mark.long
 def test_cases_together_and_full_runs_are_judged_alike() -> None:
     for duration in (3e-3, WHOLE):
         deck, speeds = soft(duration), [150.0, 600.0, 2330.0]
@@ -432,6 +436,7 @@ ON_THE_WINDOW = [(1.88, 24.0), (2.66, 33.0), (3.76, 42.0), (4.61, 47.0)]
 
 
 @pytest.mark.parametrize(("ratio", "low"), ON_THE_WINDOW)
+@pytest.mark.few(2)  # of 4, 0.1 s each
 def test_a_plate_on_a_window_is_told_one_error_which_is_that_of_nonlinear_runs(
     ratio: float, low: float
 ) -> None:

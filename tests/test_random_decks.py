@@ -200,6 +200,7 @@ SHORT_ZONES = (1, 2)
 @pytest.mark.parametrize(
     "seed", [pytest.param(n, marks=() if n in SHORT_ZONES else pytest.mark.long) for n in range(40)]
 )
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_every_solver_gives_the_same_result_of_several_laminates(seed: int) -> None:
     agree(several_laminates(seed))
 

@@ -421,6 +421,7 @@ def test_impossible_draws_are_refused_before_a_sensitivity_study(folder: Path) -
     assert "lognormal" in done.stderr
 
 
+@pytest.mark.long
 def test_the_cost_is_told_beforehand(folder: Path) -> None:
     done = sweep(folder, "--random", "e1=normal:17.5e6,5e5", "--samples", 16, "--design", "mc")
     assert "16 draws need 16 plates, because e1 is random" in done.stderr
@@ -471,6 +472,7 @@ def test_the_cost_is_told_beforehand(folder: Path) -> None:
         ((*UNIFORM, "--exceed", "peak_force=threshold"), "DELA"),
     ],
 )  # fmt: skip
+@pytest.mark.few(10)  # of 33, 0.01 s each
 def test_bad_input_is_one_line(folder: Path, options: tuple[object, ...], told: str) -> None:
     done = sweep(folder, *options)
     assert_unusable(done)
@@ -533,6 +535,7 @@ def test_pictures_need_a_random_sweep(folder: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["exceedance", "sensitivity", "scatter"])
 @pytest.mark.parametrize("width", ["column", "full"])
+@pytest.mark.few(1)  # of 6, 0.3 s each
 def test_the_line_of_doubtful_draws_is_not_cut(
     folder: Path, kind: str, width: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

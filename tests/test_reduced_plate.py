@@ -88,6 +88,7 @@ def relaxed_energy(plate: PlateModel, field: Floats) -> float:
 @pytest.mark.parametrize("held", [True, False])
 @pytest.mark.parametrize("curvature", [FLAT, (0.05, -0.1, 0.02)])
 @pytest.mark.parametrize("lam", [isotropic_plate(THICKNESS), general_plate()])
+@pytest.mark.few(3)  # of 8, 0.08 s each
 def test_the_energy_is_that_of_the_elements_with_the_membrane_in_equilibrium(
     lam: LaminateSection, curvature: Curvature, held: bool
 ) -> None:
@@ -221,6 +222,7 @@ def test_the_period_of_a_duffing_oscillator_is_that_of_jacobi() -> None:
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.03])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_free_vibration_keeps_its_energy_with_that_of_the_damping(damping: float) -> None:
     dt, none = 0.05, np.zeros(1)
     motion = ReducedMotion(one_mode(0.2, damping), dt, 1)

@@ -52,6 +52,7 @@ def swept() -> fecm.SweepResult:
     return fecm.sweep(DECK, given, model="reduced", modes=ENOUGH, measure="max_deflection")
 
 
+@pytest.mark.long
 def test_in_all_modes_the_cases_are_those_of_full_runs() -> None:
     # All modes that the load moves take thrice the steps of a few.
     given = {"velocity": [300.0, 1000.0]}
@@ -92,6 +93,7 @@ def test_impacts_up_to_twice_the_thickness_are_those_of_a_spectral_program(case:
     assert np.abs(found.reduced.difference(RATIO)).max() < 1e-3
 
 
+@pytest.mark.long
 def test_three_full_runs_are_stored_beside_the_cases_and_shown(
     swept: fecm.SweepResult, tmp_path: Path
 ) -> None:
@@ -135,6 +137,7 @@ def test_too_few_modes_are_refused_before_the_sweep(monkeypatch: pytest.MonkeyPa
     assert [task.numbers for task in ran] == [(3,)] * 2 + [(0,)] * 2
 
 
+@pytest.mark.long
 def test_cases_of_energies_at_which_the_model_does_not_hold_are_run_in_full(
     tmp_path: Path,
 ) -> None:
@@ -190,6 +193,7 @@ def test_a_case_does_not_depend_on_the_others(swept: fecm.SweepResult) -> None:
         np.testing.assert_equal(again[name][0], swept[name][2])
 
 
+@pytest.mark.long
 def test_random_values_are_by_the_model_too() -> None:
     found = fecm.sweep(
         DECK,
@@ -230,6 +234,7 @@ def test_a_rod_takes_a_step_in_which_a_wave_crosses_one_element_at_most() -> Non
     assert made.halved(times).dt <= 0.5 / 4 * (2e-4 / 1e7) ** 0.5
 
 
+@pytest.mark.long
 def test_the_compliance_left_out_is_in_series_with_the_contact() -> None:
     # A plate that does not move but by the spring: the energy of the projectile is that of both.
     k, c, mass, speeds = 1e5, 2e-5, 1e-3, np.array([500.0, 2000.0])

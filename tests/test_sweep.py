@@ -115,6 +115,7 @@ def test_no_case_depends_on_the_others_of_its_plate() -> None:
         np.testing.assert_array_equal(many[name][some], values)
 
 
+@pytest.mark.long
 def test_the_law_of_many_cases_is_the_law_of_each() -> None:
     random = np.random.default_rng(11)
     measured = [
@@ -146,6 +147,7 @@ def test_the_law_of_many_cases_is_the_law_of_each() -> None:
 # Against full runs -------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_cases_on_the_reports_plate_equal_their_full_runs() -> None:
     cases: list[Case] = [
         {"velocity": 50.0, "k": 1.0e6, "rod_mass": 1.8e-4, "s_p": 0.094, "q": 2.0},
@@ -191,6 +193,7 @@ def test_momentum_and_energy_of_the_summary_are_those_of_the_rods_centre() -> No
         {"x0": 0.7, "y0": 1.2}, {"patch": 0.4, "impact_node": 7},
     ],
 )  # fmt: skip
+@pytest.mark.few(7)  # of 14, 0.09 s each
 def test_whatever_varies_the_case_is_the_changed_decks_run(case: Case) -> None:
     deck = model(small(STEPS))
     found = fecm.sweep(deck, cases=[case], history=True)
@@ -421,6 +424,7 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
     assert_same(found, serial())
 
 
+@pytest.mark.long
 def test_a_scheduler_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr(execute, "PATIENCE", 0.5)
@@ -584,6 +588,7 @@ def test_a_run_and_a_sweep_are_not_taken_for_one_another(tmp_path: Path) -> None
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads /proc")
+@pytest.mark.long
 def test_a_closing_terminal_does_not_end_the_resource_tracker() -> None:
     """Without its first tracker, multiprocessing prints tracebacks about semaphores."""
     script = (

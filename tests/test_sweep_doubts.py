@@ -38,6 +38,7 @@ def short() -> fecm.Deck:
      ("thickness", [3.0], "ply_thickness is the thickness of a ply"),
      ("laminate_thickness", [0.15, 0.2], "laminate_thickness = 0.15 is less than two plies")],
 )  # fmt: skip
+@pytest.mark.few(2)  # of 5, 0.2 s each
 def test_a_swept_value_in_another_unit_is_told_once(
     name: str, values: list[float], text: str
 ) -> None:
@@ -50,6 +51,7 @@ def test_a_swept_value_in_another_unit_is_told_once(
     [("velocity", [1000.0, 5000.0]), ("mass", [1e-3, 6e-3]), ("laminate_thickness", [2.0, 4.0]),
      ("ply_thickness", [0.15, 0.2]), ("k", [2e4, 1e5]), ("radius", [5.0, 25.0])],
 )  # fmt: skip
+@pytest.mark.few(1)  # of 6, 0.2 s each
 def test_sound_swept_values_are_not_remarked(name: str, values: list[float]) -> None:
     assert not [note for note in sweep_notes(**{name: values}) if f"{name} =" in note]
 
@@ -58,6 +60,7 @@ def test_sound_swept_values_are_not_remarked(name: str, values: list[float]) -> 
     ("name", "inside", "outside"),
     [("at", "(15,12)", "(20,2)"), ("impact_node", 0, 1), ("y0", 12.0, 2.0)],
 )
+@pytest.mark.few(1)  # of 3, 0.2 s each
 def test_an_impact_beside_the_window_of_a_fixture_is_named_once(
     name: str, inside: float | str, outside: float | str
 ) -> None:
@@ -96,6 +99,7 @@ def damped() -> Problem:
 
 @pytest.mark.parametrize("name", sorted(JUDGED))
 @pytest.mark.parametrize("value", [0.0, -1.0, 1.7e308, 5e-324])
+@pytest.mark.few(30)  # of 148, 0.01 s each
 def test_an_impossible_value_is_left_to_its_case(name: str, value: float) -> None:
     assert all(note.startswith(name) for note in doubtful_values(damped(), [{name: value}]))
 

@@ -120,6 +120,7 @@ def test_a_sweep_is_the_same_as_itself_run_again(swept: Path, tmp_path: Path) ->
         ("summary/status", b"lost", "`ok` against `lost` at case 4; 1 text differs"),
     ],
 )
+@pytest.mark.few(2)  # of 5, 0.1 s each
 def test_another_number_or_text_of_a_case_is_a_difference(
     swept: Path, changed: Callable[[str, object], Path], name: str, value: object, told: str
 ) -> None:

@@ -57,6 +57,7 @@ def without_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
      (DECK.replace("EXPE", GAGE), ANY, ("gages", "max_deflection")),
      (DECK.replace(LAW, "EXPE ACR\n  1912000. 0.0006564"), FIRM, ("max_deflection",))],
 )  # fmt: skip
+@pytest.mark.few(2)  # of 5, 0.8 s each
 def test_cases_are_those_of_numpy(
     deck: str, cases: list[Case], measured: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -90,6 +91,7 @@ def test_a_case_has_the_same_bytes_with_any_others() -> None:
 
 
 @compiled
+@pytest.mark.long
 def test_errors_of_the_energy_balance_are_those_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of cases that lose energy, some whose motion is not finite."""
     seen: list[responses.ComputedImpacts] = []

@@ -169,6 +169,7 @@ def test_markers_of_the_largest_values_are_not_cut(plane: SweepResult) -> None:
     assert plot(sweep).axes[0].get_ylim() == (0.0, pytest.approx(10.5))
 
 
+@pytest.mark.long
 def test_thresholds_of_different_plates_are_drawn_case_by_case() -> None:
     layups = ["[0/90]", "[0/0]"]
     sweep = fecm.sweep(TOUGH, {"layup": layups, "velocity": [20.0, 200.0]})
@@ -308,6 +309,7 @@ def test_one_value_of_three_is_not_drawn_without_the_others() -> None:
 @pytest.mark.parametrize(
     "vary", [{"velocity": VELOCITIES}, {"velocity": VELOCITIES, "k": [1.7e6, 2e6]}]
 )
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_cases_still_in_contact_are_crossed_and_counted(vary: dict[str, list[float]]) -> None:
     sweep = fecm.sweep(LONG_ENOUGH_FOR_TWO, vary)
     count = int(sweep.still_in_contact.sum())
@@ -464,6 +466,7 @@ def test_a_command_notes_failed_cases(plane: SweepResult, tmp_path: Path) -> Non
         ("deck.inp", ("--kind", "map"), "is a deck, not a result; `fecm run "),
     ],
 )
+@pytest.mark.few(3)  # of 7, 0.04 s each
 def test_a_call_that_makes_no_map_is_refused_in_one_line(
     file: Path,
     runs: Path,

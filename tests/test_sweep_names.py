@@ -71,6 +71,7 @@ CASES: list[tuple[Case, dict[str, str]]] = [
 
 
 @pytest.mark.parametrize(("number", "patch"), [(n, "disc" if n % 2 else "none") for n in range(7)])
+@pytest.mark.few(3)  # of 7, 0.1 s each
 def test_a_case_is_the_deck_that_new_writes_with_its_values(number: int, patch: str) -> None:
     case, options = CASES[number]
     found = fecm.sweep(new(patch=patch), cases=[case], history=True)
@@ -191,6 +192,7 @@ def test_places_that_can_not_be_hit_are_cases_with_a_reason() -> None:
 # Time step and duration --------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_dt_auto_is_dt_0_of_the_deck_of_the_case() -> None:
     deck = new(dt="2e-7")
     found = fecm.sweep(deck, {"dt": ["auto", 2e-7], "thickness": [2.0, 8.0]})
@@ -235,6 +237,7 @@ def test_loops_that_can_not_keep_the_duration_are_told() -> None:
 # Columns on request ------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_measured_columns_are_those_of_full_runs(tmp_path: Path) -> None:
     deck, speeds = gaged(), [1500.0, 3000.0]
     quick = fecm.sweep(deck, {"velocity": speeds}, measure=("gages", "max_deflection"))
@@ -285,6 +288,7 @@ def test_columns_that_a_deck_does_not_have_are_refused(names: object, message: s
         fecm.sweep(small(), {"k": [1e6]}, measure=names)  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 def test_the_command_measures_and_counts_what_failed(tmp_path: Path) -> None:
     deck, path = tmp_path / "p.inp", tmp_path / "s.h5"
     deck.write_text(gaged().to_text())

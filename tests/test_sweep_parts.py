@@ -178,6 +178,7 @@ def test_a_sound_part_is_taken_without_a_word(stored: tuple[Path, Path, bytes]) 
 
 
 @pytest.mark.parametrize("what", FORGERIES)
+@pytest.mark.few(3)  # of 15, 0.1 s each
 def test_a_part_with_a_right_checksum_and_wrong_content_is_run_again(
     what: str, stored: tuple[Path, Path, bytes]
 ) -> None:
@@ -186,6 +187,7 @@ def test_a_part_with_a_right_checksum_and_wrong_content_is_run_again(
 
 
 @pytest.mark.parametrize("data", [b"", b"PK", b"\x93NUMPY", b"PK\x05\x06" + 18 * b"\0"])
+@pytest.mark.few(2)  # of 4, 0.1 s each
 def test_a_part_that_is_no_archive_is_run_again_despite_its_checksum(
     data: bytes, stored: tuple[Path, Path, bytes]
 ) -> None:
@@ -215,6 +217,7 @@ def test_a_part_of_another_sweep_with_the_same_case_numbers_is_run_again(
 @pytest.mark.posix
 @pytest.mark.links
 @pytest.mark.parametrize("kind", ["folder", "FIFO", "link", "device"])
+@pytest.mark.few(2)  # of 4, 0.1 s each
 def test_a_part_that_is_no_ordinary_file_is_run_again(
     kind: str, stored: tuple[Path, Path, bytes]
 ) -> None:
@@ -236,6 +239,7 @@ def test_a_part_that_is_no_ordinary_file_is_run_again(
 @pytest.mark.posix
 @pytest.mark.links
 @pytest.mark.parametrize("kind", ["folder", "FIFO", "link", "device", "long", "deep"])
+@pytest.mark.few(2)  # of 6, 0.2 s each
 def test_a_mark_that_is_no_ordinary_file_is_not_believed(
     kind: str, stored: tuple[Path, Path, bytes]
 ) -> None:

@@ -56,6 +56,7 @@ def new(layup: str, *options: str) -> str:
     ("base", "support"),
     [(LAYUPS[0], "simple"), (LAYUPS[1], "free"), (LAYUPS[1], "clamped")],
 )
+@pytest.mark.few(1)  # of 3, 0.5 s each
 def test_a_sweep_of_layups_is_new_and_run_of_each(base: str, support: str) -> None:
     options = "--support", support, "--duration", "5e-5"
     found = fecm.sweep(new(base, *options), {"layup": LAYUPS}, history=True)
@@ -87,6 +88,7 @@ def test_u_and_v_are_free_where_b_is_not_zero_and_w_is_free() -> None:
     assert kept.all(Boundary) == deck.all(Boundary)
 
 
+@pytest.mark.long
 def test_a_note_counts_the_cases_whose_u_and_v_are_set_free(tmp_path: Path) -> None:
     deck = tmp_path / "plate.inp"
     deck.write_text(new("[0/90]s"))

@@ -172,6 +172,7 @@ def readings(result: fecm.Result) -> dict[str, float]:
 OWN: dict[str, list[Any]] = {"speed": [50, 100], "kind": ["", "long", "lost", "metric"]}
 
 
+@pytest.mark.long
 def test_built_decks_give_the_results_of_runs_and_keep_names_and_measured_columns(
     tmp_path: Path,
 ) -> None:

@@ -122,6 +122,7 @@ def test_the_deck_of_a_sweep_is_never_read_as_a_path(tmp_path: Path) -> None:
     assert not whole.convergence["peak_force"].remark
 
 
+@pytest.mark.long
 def test_the_limit_of_two_meshes_is_that_of_the_series() -> None:
     found = fecm.sweep(plate(), refine=[1, 2], history=True)
     assert found["elements"].tolist() == [216, 864]
