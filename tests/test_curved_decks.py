@@ -78,6 +78,7 @@ def held(deck: Deck) -> dict[str, set[str]]:
         ({"in_plane": "free"}, set(), set()),
     ],
 )
+@pytest.mark.few(3)  # of 7, 0.05 s each
 def test_edges_of_a_curved_panel_hold_what_their_support_says(
     given: dict[str, Any], left: set[str], bottom: set[str]
 ) -> None:
@@ -179,6 +180,7 @@ def test_a_new_plate_of_a_curved_deck_has_the_supports_of_a_panel() -> None:
 @pytest.mark.parametrize(
     ("nx", "factor"), [(16, 1.461), pytest.param(32, 1.161, marks=pytest.mark.long)]
 )
+@pytest.mark.long
 def test_the_buckling_load_of_a_coarse_curved_panel_is_an_upper_bound(
     nx: int, factor: float
 ) -> None:
@@ -241,6 +243,7 @@ def test_summaries_say_radii_and_rise(curved: fecm.Result) -> None:
     assert "  curved panel        Rx 100 mm, Ry -200 mm, rise 1.375 mm" in summary.lines()
 
 
+@pytest.mark.long
 def test_an_estimate_says_which_model_is_flat() -> None:
     flat, bent = fecm.estimate(panel()), fecm.estimate(panel(radius_x=100.0))
     assert bent.remarks["curvature"].endswith("the infinite plate is flat")

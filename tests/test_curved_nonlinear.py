@@ -96,6 +96,7 @@ def test_an_arch_snaps_through_along_the_exact_curve() -> None:
 
 
 @pytest.mark.parametrize(("thickness", "limit"), [(12.7, 2200.0), (6.35, 590.0)])
+@pytest.mark.few(1)  # of 2, 0.3 s each
 def test_a_hinged_roof_carries_the_published_load(thickness: float, limit: float) -> None:
     """A. B. Sabir and A. C. Lock (1972): a force on 508 x 508 mm, R = 2540 mm; about 1 %."""
     modulus, nu = 3102.75, 0.3
@@ -124,6 +125,7 @@ def test_a_hinged_roof_carries_the_published_load(thickness: float, limit: float
     assert loads[-1] < max(loads)
 
 
+@pytest.mark.long
 def test_an_estimate_of_a_panel_that_snaps_through_ends_at_the_load_that_it_carries() -> None:
     def found(radius: float, velocity: float) -> QuickEstimate:
         deck = struck((0.0, radius), mesh(5), 5e-7, 10, others=(NONL,), velocity=velocity)
@@ -141,6 +143,7 @@ def test_an_estimate_of_a_panel_that_snaps_through_ends_at_the_load_that_it_carr
 
 
 @pytest.mark.parametrize("radii", [(500.0,), (0.0, -500.0), (0.0, 0.0, 400.0)])
+@pytest.mark.few(1)  # of 3, 0.3 s each
 def test_stresses_at_a_small_load_are_those_of_the_linear_panel(radii: tuple[float, ...]) -> None:
     """Deflections below 2e-6 mm: the squares of slopes are nothing beside w/R."""
     solved = "LOOP=5 TANG FORM SOLV CONV NEXT STRE"

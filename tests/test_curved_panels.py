@@ -49,6 +49,7 @@ def mean_deflection(found: Result) -> float:
 
 
 @by_panel(PANELS[0], PANELS[3])
+@pytest.mark.few(1)  # of 2, 0.3 s each
 def test_the_static_deflection_is_that_of_the_series(radii: tuple[float, float]) -> None:
     found = decks.run_of_deck(panel(radii, STATIC, fine_middle(8), load=1.0))
     assert mean_deflection(found) == pytest.approx(float(ROWS[radii][curved_panels.W]), rel=1.5e-3)
@@ -56,6 +57,7 @@ def test_the_static_deflection_is_that_of_the_series(radii: tuple[float, float])
 
 
 @by_panel(PANELS[3])
+@pytest.mark.long
 def test_membrane_forces_and_moments_are_those_of_the_series(radii: tuple[float, float]) -> None:
     deck = panel(radii, f"{STATIC} STRE", fine_middle(16), load=1.0, points=2)
     found = decks.run_of_deck(deck)

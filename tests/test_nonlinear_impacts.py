@@ -105,6 +105,7 @@ PULSES = [
 
 
 @pytest.mark.parametrize("row", PULSES)
+@pytest.mark.long
 def test_the_period_and_first_peak_after_a_pulse_are_the_spectral_ones(row: Row) -> None:
     _, zeros, peak = vibration(row, 8)
     assert zeros[2] - zeros[0] == pytest.approx(float(row["period_s_zero1_to_zero3"]), rel=1e-4)
@@ -144,6 +145,7 @@ QUICK = {("iso_clamped_immovable", "3.0"), ("cross_ss_immovable", "2.0")}
 
 
 @pytest.mark.parametrize("row", rows("nonlinear_impacts.csv", "case", QUICK))
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_impacts_on_a_coarse_mesh_follow_the_spectral_solution(row: Row) -> None:
     found = struck(row, 16)
     # The force rings with modes that this mesh does not resolve, and the linear plate's as much.

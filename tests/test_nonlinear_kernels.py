@@ -112,6 +112,7 @@ def products(plate: PlateModel, kept: SymmetryReduction) -> tuple[CompiledProduc
 @pytest.mark.parametrize(
     ("preload", "curvature"), [(UNLOADED, FLAT), (PRELOAD, FLAT), (PRELOAD, (0.7, -0.4, 0.3))]
 )
+@pytest.mark.few(8)  # of 36, 0.03 s each
 def test_the_forces_of_a_stretched_plate_are_numpys(
     name: str, laminate: str, preload: tuple[float, float, float], curvature: Curvature
 ) -> None:
@@ -228,6 +229,7 @@ IMPACTS = {
 @compiled
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
 @pytest.mark.parametrize("name", IMPACTS)
+@pytest.mark.few(2)  # of 4, 0.3 s each
 def test_an_impact_on_a_stretched_plate_is_that_of_numpy(name: str) -> None:
     found, wanted = (fecm.run_one(IMPACTS[name], solver=s) for s in ("kernels", "numpy"))
     assert_close(found, wanted)

@@ -225,6 +225,7 @@ def static(case: str, deflection: str) -> tuple[dict[str, str], Result]:
     ("case", "deflection"),
     [("iso_100x100x2_clamped_immovable", "1.0"), ("iso_100x100x2_ss_immovable", "2.0")],
 )
+@pytest.mark.few(1)  # of 2, 0.3 s each
 def test_resultants_and_energy_are_those_of_an_independent_solution(
     case: str, deflection: str
 ) -> None:
@@ -319,6 +320,7 @@ def test_gages_of_a_run_read_what_the_stored_displacements_say() -> None:
 
 
 @pytest.mark.skipif(kernels.LIBRARY is None, reason="needs the compiled kernels")
+@pytest.mark.long
 def test_kernels_store_what_numpy_does() -> None:
     deck = struck(NONL, GAGES, STRENGTHS, more="PLYS=5 FAIL=5")
     one, other = (fecm.run_one(deck, solver=solver) for solver in ("kernels", "numpy"))

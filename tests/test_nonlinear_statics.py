@@ -149,6 +149,7 @@ def gradient(corners: Corners, seed: int, curvature: Curvature) -> Floats:
 
 @ELEMENTS
 @SHAPES
+@pytest.mark.few(3)  # of 8, 0.08 s each
 def test_the_internal_force_is_the_gradient_of_the_strain_energy(
     corners: Corners, seed: int, curvature: Curvature
 ) -> None:
@@ -233,6 +234,7 @@ def strip(distorted: bool) -> PlateModel:
 
 
 @pytest.mark.parametrize(("distorted", "limit"), [(False, 1e-9), (True, 5e-4)])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_a_strip_that_is_free_to_shorten_bends_without_membrane_locking(
     distorted: bool, limit: float
 ) -> None:
@@ -288,6 +290,7 @@ def solved(name: str, rows: list[Row], n: int) -> list[tuple[float, float]]:
 
 
 @pytest.mark.parametrize("name", [name for name in rectangles() if "uniform" in name])
+@pytest.mark.few(1)  # of 5, 0.2 s each
 def test_rectangles_under_pressure_follow_the_spectral_solution_up_to_three_thicknesses(
     name: str,
 ) -> None:
@@ -304,6 +307,7 @@ def test_the_error_under_pressure_falls_with_more_than_the_third_order(name: str
 
 
 @pytest.mark.parametrize("name", [name for name in rectangles() if "hert" in name])
+@pytest.mark.few(2)  # of 4, 0.3 s each
 def test_rectangles_under_a_patch_follow_the_spectral_solution(name: str) -> None:
     known = [row for row in rectangles()[name] if float(row["rel_change_n"]) < 1e-3]
     assert np.abs(solved(name, [known[2], known[-1]], 8)).max() < 1e-3
@@ -343,6 +347,7 @@ CIRCLES = [
 
 
 @pytest.mark.parametrize(("edge", "load"), CIRCLES)
+@pytest.mark.few(1)  # of 5, 0.4 s each
 def test_circular_plates_follow_the_axisymmetric_solution(edge: str, load: str) -> None:
     kind, radius = load.split()
     rows = [
@@ -362,6 +367,7 @@ def test_circular_plates_follow_the_axisymmetric_solution(edge: str, load: str) 
 
 @pytest.mark.parametrize("ends", ["pinned", "clamped"])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.few(2)  # of 4, 0.2 s each
 def test_an_unsymmetric_strip_bends_as_the_closed_form_for_both_signs_of_the_load(
     ends: str, sign: float
 ) -> None:
@@ -398,6 +404,7 @@ def test_an_unsymmetric_strip_bends_as_the_closed_form_for_both_signs_of_the_loa
 
 
 @pytest.mark.parametrize("ratio", ["-0.5", "5.0"])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_a_plate_with_preload_stretches_as_the_spectral_solution(ratio: str) -> None:
     rows = [row for row in table("nonlinear_preload.csv") if row["N0_over_Ncr_biaxial"] == ratio]
     N0 = float(rows[0]["N0_N_per_mm"])
@@ -411,6 +418,7 @@ def test_a_plate_with_preload_stretches_as_the_spectral_solution(ratio: str) -> 
         assert found.energy == pytest.approx(float(row["strain_energy_above_preload_mJ"]), rel=4e-4)
 
 
+@pytest.mark.long
 def test_a_preload_by_displaced_edges_is_that_of_the_card() -> None:
     by_card = with_preload(
         rectangle(100.0, 100.0, 4, isotropic(), "ss_immovable"), 505.0, -30.0, 0.0

@@ -65,6 +65,7 @@ def test_every_case_is_a_full_run_of_the_stretched_plate(runs: list[float]) -> N
     assert fecm.run_one(LINEAR).plate_w.max() > 1.09 * fecm.run_one(DECK).plate_w.max()
 
 
+@pytest.mark.long
 def test_the_limit_of_the_linear_plate_is_none_of_a_nonlinear_one() -> None:
     linear, nonlinear = (fecm.sweep(deck, {"k": [5e4]}) for deck in (LINEAR, DECK))
     deflections = [fecm.run_one(deck).plate_w.max() for deck in (LINEAR, DECK)]
@@ -99,6 +100,7 @@ def test_a_search_takes_few_runs_and_its_velocity_gives_the_same_run_again(
             np.testing.assert_allclose(again[name][0], found[name][0], rtol=1e-9)
 
 
+@pytest.mark.long
 def test_a_search_starts_at_the_quick_models_and_lengthens_runs_that_end_too_early(
     runs: list[float],
 ) -> None:
@@ -112,6 +114,7 @@ def test_a_search_starts_at_the_quick_models_and_lengthens_runs_that_end_too_ear
     assert 1.0 < starts[0] / found["found_velocity"][0] < 1.3
 
 
+@pytest.mark.long
 def test_the_number_of_runs_and_their_time_are_told_first(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(DECK)
     done = call("sweep", "d.inp", "--vary", "velocity=300,400,500", cwd=tmp_path)
@@ -141,6 +144,7 @@ def test_the_expected_time_grows_with_the_work(monkeypatch: pytest.MonkeyPatch) 
     assert expected_time(cases) == "56 s"
 
 
+@pytest.mark.long
 def test_refined_and_random_cases_are_full_runs_too(runs: list[float]) -> None:
     short = DECK.replace("LOOP        600", "LOOP         60")
     refined = fecm.sweep(short, refine=[1, 2])
@@ -157,6 +161,7 @@ def test_refined_and_random_cases_are_full_runs_too(runs: list[float]) -> None:
 HEAVY = DECK.replace("2e-5", "2e-2").replace("600.0", " 20.0")  # M/M_plate = 100
 
 
+@pytest.mark.long
 def test_the_estimate_of_a_nonlinear_plate_has_a_static_row_from_its_curve(tmp_path: Path) -> None:
     program = PROGRAM.replace("        600", "         20")
     (tmp_path / "d.inp").write_text(HEAVY.replace(PROGRAM, program))
@@ -217,6 +222,7 @@ def test_a_loaded_plate_has_no_static_curve() -> None:
     assert velocity_at(heavy, static.threshold) == pytest.approx(static.velocity, rel=1e-8)
 
 
+@pytest.mark.long
 def test_a_case_that_is_run_in_full_is_judged_as_the_run_of_its_deck() -> None:
     """Slope and strain need the rows of RODP, which the case keeps for its judge."""
     deck = problem_of(DECK).deck

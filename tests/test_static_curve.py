@@ -50,6 +50,7 @@ def curve_of(plate: PlateModel, shape: str, radius: float, deflection: float) ->
 
 
 @pytest.mark.parametrize(("edge", "shape"), [("clamped_immovable", "HERT"), ("ss_movable", "DISC")])
+@pytest.mark.few(1)  # of 2, 0.7 s each
 def test_force_and_work_of_a_disc_are_those_of_the_axisymmetric_solution(
     edge: str, shape: str
 ) -> None:
@@ -73,6 +74,7 @@ def test_force_and_work_of_a_disc_are_those_of_the_axisymmetric_solution(
     "case",
     ["iso_100x100x2_clamped_immovable", "unsym_0_4_90_4_100x100x2_ss_immovable"],
 )
+@pytest.mark.few(1)  # of 2, 0.5 s each
 def test_force_and_work_of_a_rectangle_are_those_of_the_spectral_solution(case: str) -> None:
     rows = [
         row
@@ -122,6 +124,7 @@ def test_a_curve_that_is_never_enough_is_an_error(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize("edge", ["clamped_immovable", "ss_movable"])
+@pytest.mark.few(1)  # of 2, 0.4 s each
 def test_the_balance_of_energy_gives_the_peaks_of_the_exact_static_curve(edge: str) -> None:
     rows = [row for row in table("nonlinear_circle_estimates.csv") if row["edge"] == edge]
     plate = disc(50.0, 4, isotropic(), edge)
