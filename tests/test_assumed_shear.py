@@ -143,6 +143,7 @@ def test_the_patch_test_of_constant_curvature_is_passed_on_every_straight_sided_
     [(9, {4: 1.7e-3, 8: 9.8e-5, 16: 6.1e-6}), (4, {8: 5.3e-3, 16: 1.3e-3})],
 )
 @pytest.mark.parametrize("h", [0.1, 0.01, 0.001])
+@pytest.mark.few(2)  # of 6, 0.06 s each
 def test_a_thin_plate_bends_as_accurately_as_a_thick_one(
     kind: int, errors: dict[int, float], h: float
 ) -> None:

@@ -175,6 +175,7 @@ def frequency(n: int, kind: int, *, lumped: bool = False) -> float:
         (12, (8, 16), 6.0, 1e-7),
     ],
 )
+@pytest.mark.few(3)  # of 7, 0.1 s each
 def test_frequencies_with_consistent_mass_come_from_above_at_the_rate_of_theory(
     kind: int, meshes: tuple[int, ...], rate: float, ceiling: float
 ) -> None:
@@ -200,6 +201,7 @@ def test_lumping_takes_the_12_node_elements_rate_down_to_2() -> None:
     [(3, (2, 1), 1.5, 0.13), (10, (4, 4), 1.5, 0.07), (11, (4, 4), 1.6, 0.04),
      (12, (4, 4), 2.0, 1e-4)],
 )  # fmt: skip
+@pytest.mark.few(2)  # of 4, 0.2 s each
 def test_bending_converges_on_ever_finer_distorted_meshes_of_triangles_and_cubics(
     kind: int, orders: tuple[int, int], rate: float, ceiling: float
 ) -> None:

@@ -120,6 +120,7 @@ def test_a_patch_of_triangles_and_cubics_reproduces_constant_membrane_strain(
 
 
 @pytest.mark.parametrize("present", [*TRANSITIONS, *CUBIC_TRANSITIONS])
+@pytest.mark.few(14)  # of 44, 0.02 s each
 def test_a_transition_element_in_a_patch_reproduces_constant_membrane_strain(
     present: Bools,
 ) -> None:

@@ -28,6 +28,7 @@ QUICK = ("--mesh", "8x6", "--duration", "1e-4", "--dt", "1e-7")
 
 
 @pytest.mark.parametrize("plate", PLIES)
+@pytest.mark.few(1)  # of 2, 0.9 s each
 def test_the_static_stiffness_of_d7136_is_that_of_another_code(plate: str) -> None:
     with (Path(__file__).parent / "data" / "d7136_stiffness.csv").open() as file:
         (row,) = (r for r in csv.DictReader(file) if (r["plate"], r["support"]) == (plate, WINDOW))
@@ -107,6 +108,7 @@ def test_supports_pull_at_the_corners_with_what_kirchhoff_gives() -> None:
         ("[45/0/-45/90]3s", 1e-6, 20000.0, 5e-5, False),  # gone before the supports know of it
     ],
 )
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_a_run_on_a_window_says_with_how_much_its_supports_pull(
     layup: str, mass: float, velocity: float, duration: float, pulls: bool
 ) -> None:
@@ -169,6 +171,7 @@ SPHERE = ("--size", "100x80", "--mesh", "4x4", "--projectile", "mass:1e-3", "--v
 
 
 @pytest.mark.parametrize("ply", [PLATE, (*PLATE[:4], "--material", "AS4/8552")])
+@pytest.mark.few(1)  # of 2, 0.3 s each
 def test_contact_estimate_is_that_of_indent_estimate_and_says_so_in_the_deck(
     ply: tuple[str, ...],
 ) -> None:

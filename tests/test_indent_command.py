@@ -160,6 +160,7 @@ def test_the_picture_of_a_fit_holds_every_point_and_the_line() -> None:
 
 
 @pytest.mark.parametrize("options", [("--path", "2e-3,0"), ("--rigidity", "--q", "2.5")])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_curves_and_rigidities_are_drawn(tmp_path: Path, options: tuple[str, ...]) -> None:
     pytest.importorskip("matplotlib")
     picture = tmp_path / "curve.svg"
@@ -236,6 +237,7 @@ def test_a_fit_states_the_units_of_its_card(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("columns", ["3,2", "way,push", "WAY,2"])
+@pytest.mark.few(1)  # of 3, 0.1 s each
 def test_columns_are_chosen_by_name_or_number(tmp_path: Path, columns: str) -> None:
     a, f = make_test()
     file = tmp_path / "test.csv"

@@ -132,6 +132,7 @@ def test_a_closed_path_never_gives_energy_back(path: list[float]) -> None:
 @pytest.mark.parametrize("kind", [HystereticLaw, ListingLaw])
 @settings(max_examples=25)
 @given(paths=st.lists(st.lists(indentations, min_size=6, max_size=6), min_size=1, max_size=8))
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_many_cases_at_once_are_each_the_single_case(
     kind: type[HystereticLaw[Any]] | type[ListingLaw[Any]], paths: list[list[float]]
 ) -> None:

@@ -49,6 +49,7 @@ def hook(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 @needs_compiler
 @pytest.mark.parametrize("flag", ["-ffast-math", "-Ofast", "-ffinite-math-only"])
+@pytest.mark.few(1)  # of 3, 0.4 s each
 def test_the_sources_refuse_a_compiler_that_takes_all_numbers_for_finite(
     flag: str, hook: Any
 ) -> None:

@@ -99,6 +99,7 @@ def assert_same_product(text: str, dofs: int, slips: frozenset[str]) -> None:
 @compiled
 @pytest.mark.parametrize("kind", [3, 4, 8, 9, 10, 12])
 @pytest.mark.parametrize("coupled", [False, True])
+@pytest.mark.few(3)  # of 12, 0.2 s each
 def test_the_product_is_numpys_for_every_family_and_rule(kind: int, coupled: bool) -> None:
     meshes = square(5, 4, kind), distorted_square(5, 4, kind)
     for mesh, orders, variant in itertools.product(
@@ -219,6 +220,7 @@ def assert_close(found: Result, wanted: Result) -> None:
 
 @compiled
 @pytest.mark.parametrize("name", DECKS)
+@pytest.mark.few(3)  # of 10, 0.2 s each
 def test_a_run_is_that_of_numpy(name: str) -> None:
     found, wanted = (fecm.run_one(DECKS[name], solver=s) for s in ("kernels", "numpy"))
     assert_close(found, wanted)

@@ -53,6 +53,7 @@ def whole(mesh: tuple[Floats, object]) -> MeshArrays:
 
 @pytest.mark.parametrize("shape", [DISC, HERTZ])
 @pytest.mark.parametrize("c", [0.5, 0.25, 0.125])
+@pytest.mark.few(2)  # of 6, 0.1 s each
 def test_the_compliance_under_a_patch_is_that_of_the_series(shape: str, c: float) -> None:
     name = {DISC: "disc", HERTZ: "hertz"}[shape]
     (exact,) = (

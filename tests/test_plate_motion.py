@@ -123,6 +123,7 @@ def frequencies(n: int, kind: int, shear: int, count: int = 1, ks: float = 1.0) 
         (4, 1, (8, 16, 32), 2.0, 1e-3),
     ],
 )
+@pytest.mark.few(1)  # of 3, 0.2 s each
 def test_the_fundamental_frequency_converges_to_mindlins_at_the_rate_of_theory(
     kind: int, shear: int, meshes: tuple[int, ...], rate: float, ceiling: float
 ) -> None:
@@ -230,6 +231,7 @@ def test_a_uniformly_loaded_plate_bends_as_mindlins_however_thin(
 # before.
 @pytest.mark.parametrize(("ks", "label"), [(1.0, "1.000000"), (5.0 / 6.0, "0.833333")])
 @pytest.mark.parametrize(("ratio", "in_centre"), [(0.1, 5e-4), (0.01, 5e-3)])
+@pytest.mark.few(2)  # of 4, 0.1 s each
 def test_full_shear_quadrature_stiffens_a_plate_less_and_less_on_finer_meshes(
     ratio: float, in_centre: float, ks: float, label: str
 ) -> None:

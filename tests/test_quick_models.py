@@ -193,6 +193,7 @@ def test_zeners_parameter_classifies_the_reference_plates() -> None:
     [r for r in table("plate_stiffness.csv") if r["source"].endswith(("computed", "37"))][::3],
     ids=lambda row: f"{row['plate']} {row['value']}",
 )
+@pytest.mark.few(1)  # of 2, 0.6 s each
 def test_the_static_stiffness_of_thin_plates_is_timoshenkos(row: dict[str, str]) -> None:
     ratio = row["plate"].partition("b/a=")[2].partition(" ")[0] or "1"
     support = "clamped" if "clamped" in row["plate"] else "simple"

@@ -131,6 +131,7 @@ def test_in_plane_unknowns_rest_only_where_nothing_couples_them_to_bending() -> 
 
 @pytest.mark.parametrize("data", [SYMMETRIC, DATA_CARDS, UNSYMMETRIC])
 @pytest.mark.parametrize("mesh", [MESH, CLAMPED, FREE_IN_PLANE])
+@pytest.mark.few(3)  # of 9, 0.1 s each
 def test_a_reduced_plate_gives_what_the_whole_one_does(mesh: str, data: str) -> None:
     program = PROGRAM.replace("LOOP         10", "LOOP        300")
     fast, plain = both(small(program, mesh=mesh, data=data))
@@ -140,6 +141,7 @@ def test_a_reduced_plate_gives_what_the_whole_one_does(mesh: str, data: str) -> 
         assert np.abs(fast.tape3.displacement[:, :, :2]).max() > 1e-9
 
 
+@pytest.mark.long
 def test_the_long_deck_agrees_with_the_sparse_matrix_in_every_dataset() -> None:
     deck = LONG.read_text().replace("LOOP       4000", "LOOP       1000")
     assert worst(*both(deck)) < 1e-10

@@ -143,6 +143,7 @@ def energies(step: RodIntegrator, rod: Rod, steps: int) -> Floats:
 
 
 @pytest.mark.parametrize("mass", MASSES)
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_average_acceleration_keeps_the_energy_of_every_mode_at_any_step(mass: str) -> None:
     rod = uniform(10, mass)
     for dt in (0.01, 0.3):

@@ -94,6 +94,7 @@ MODELS = {
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
+@pytest.mark.few(4)  # of 16, 0.07 s each
 def test_bounds_of_elements_are_above_their_largest_eigenvalues(model: PlateModel) -> None:
     for family in model.families:
         exact = largest_eigenvalues(model, family)
@@ -103,6 +104,7 @@ def test_bounds_of_elements_are_above_their_largest_eigenvalues(model: PlateMode
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
+@pytest.mark.few(4)  # of 16, 0.07 s each
 def test_the_safe_step_is_that_of_the_fastest_element(model: PlateModel) -> None:
     fastest = max(largest_eigenvalues(model, family).max() for family in model.families)
     assert safe_time_step(model) == pytest.approx(2.0 / np.sqrt(fastest), rel=1e-12)
@@ -212,6 +214,7 @@ TAKEN = {
 
 
 @pytest.mark.parametrize("deck", TAKEN)
+@pytest.mark.few(3)  # of 9, 0.05 s each
 def test_dt_0_takes_the_known_step_on_every_deck(deck: str) -> None:
     (problem,) = load_deck(ROOT / deck).problems
     assert taken_time_step(problem.critical_time_step) == TAKEN[deck]

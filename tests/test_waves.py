@@ -188,6 +188,7 @@ def velocities(matrix: list[list[Polynomial]]) -> Floats:
 
 @pytest.mark.parametrize("angle", [0.0, 17.0, 45.0, 90.0, 140.0])
 @pytest.mark.parametrize("wavelength", [0.5, 3.0, 10.0, 40.0])
+@pytest.mark.few(6)  # of 20, 0.02 s each
 def test_waves_of_an_unsymmetric_laminate_are_the_roots_of_its_determinant(
     angle: float, wavelength: float
 ) -> None:
@@ -201,6 +202,7 @@ def test_waves_of_an_unsymmetric_laminate_are_the_roots_of_its_determinant(
 
 
 @pytest.mark.parametrize("angles", [(0.0, 30.0, 70.0), (10.0, 80.0, 80.0), (40.0, 40.0, -50.0)])
+@pytest.mark.few(1)  # of 3, 0.4 s each
 def test_fronts_of_an_unsymmetric_laminate_are_the_roots_of_its_determinant(
     angles: tuple[float, float, float],
 ) -> None:
@@ -309,6 +311,7 @@ def test_derivatives_are_those_of_the_velocities(general: WaveSurfaces) -> None:
     np.testing.assert_allclose(here.curvature / size, curvature / size, rtol=1e-5, atol=1e-5)
 
 
+@pytest.mark.long
 def test_where_sheets_cross_or_touch_the_names_stay_on_smooth_curves() -> None:
     cross_ply = laminate(REPORT_PLY, [0.0, 90.0], [0.05, 0.05])
     one_ply = laminate(REPORT_PLY, [0.0], [0.1])
@@ -376,6 +379,7 @@ def turns(path: Floats) -> Floats:
 
 
 @pytest.mark.parametrize(("time", "radius"), [(2e-6, 0.106), (1e-5, 0.106), (3e-6, 0.0)])
+@pytest.mark.few(1)  # of 3, 0.1 s each
 def test_fronts_turn_back_at_their_cusps_and_nowhere_else(
     report: WaveSurfaces, time: float, radius: float
 ) -> None:

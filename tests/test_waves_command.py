@@ -136,6 +136,7 @@ def test_headers_have_the_units_of_a_named_ply(command: tuple[str, ...], header:
         ("--time", "1e-6", "2e-6", "--", LONG),
     ],
 )
+@pytest.mark.few(1)  # of 4, 0.2 s each
 def test_several_times_may_be_given_in_several_ways(times: tuple[object, ...]) -> None:
     found = rows(call("waves", "fronts", "--step", "45", *times))
     assert {float(row["time"]) for row in found} == {1e-6, 2e-6}
@@ -162,12 +163,14 @@ def test_the_shear_factor_multiplies_the_transverse_shear_stiffness() -> None:
         assert other["bending"] == one["bending"]
 
 
+@pytest.mark.long
 def test_fronts_start_from_a_circle_of_the_given_radius() -> None:
     for option, radius in (((), 0.106), (("--radius", "2"), 2.0), (("--radius", "0"), 0.0)):
         for row in rows(call("waves", "fronts", LONG, "--step", "45", "--time", "0", *option)):
             assert np.hypot(float(row["x"]), float(row["y"])) == pytest.approx(radius, abs=1e-15)
 
 
+@pytest.mark.long
 def test_normals_run_from_0_to_360_as_far_as_the_step_goes() -> None:
     for step, expected in (("90", [0, 90, 180, 270, 360]), ("100", [0, 100, 200, 300])):
         found = [
@@ -179,6 +182,7 @@ def test_normals_run_from_0_to_360_as_far_as_the_step_goes() -> None:
     assert float(tenths[-1]["angle_deg"]) == 360.0
 
 
+@pytest.mark.long
 def test_cusps_are_reported_on_standard_error_alone() -> None:
     done = call("waves", "fronts", LONG, "--time", "0", "5e-6")
     notes = done.stderr.splitlines()
