@@ -162,6 +162,7 @@ def bent(load: float, dt: float) -> fecm.Result:
     table("thermal_first_failure.csv"),
     ids=lambda row: f"{row['criterion']} at {row['dT_K']}",
 )
+@pytest.mark.few(2)  # of 6, 0.05 s each
 def test_the_first_ply_fails_at_the_load_of_the_exact_solution(row: dict[str, str]) -> None:
     name, dt = NAMES[row["criterion"]], float(row["dT_K"])
     expected = float(row["q0 at first failure (Pa)"])
@@ -235,6 +236,7 @@ def test_motion_force_and_stresses_between_plies_do_not_depend_on_the_cure() -> 
 
 
 @pytest.mark.parametrize("solver", ["kernels", "numpy"])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_without_a_change_a_run_stores_what_it_does_without_the_card(
     solver: Literal["kernels", "numpy"],
 ) -> None:
@@ -336,6 +338,7 @@ def struck(dt: float) -> Deck:
 @pytest.mark.parametrize(
     "values", [{"cure_dT": [-6.0, 3.0]}, {"velocity": [60.0, 80.0], "cure_dT": [-6.0, 2.0]}]
 )
+@pytest.mark.few(1)  # of 2, 0.6 s each
 def test_cases_of_a_sweep_are_the_runs_of_their_decks(values: dict[str, list[float]]) -> None:
     deck = struck(-1.0)
     found = fecm.sweep(deck, values, measure="failure")
@@ -374,6 +377,7 @@ def test_cases_that_differ_in_the_cure_alone_share_their_motion(
     assert forces[0] == forces[1]
 
 
+@pytest.mark.long
 def test_a_search_finds_the_velocity_at_which_residual_and_other_stresses_reach_1() -> None:
     (velocity,) = fecm.sweep(struck(-6.0), until={"exposure": 1.0})["found_velocity"]
     (free,) = fecm.sweep(struck(0.0), until={"exposure": 1.0})["found_velocity"]
@@ -422,6 +426,7 @@ NEW = (
         ("E-glass/MY750", ":20", -100.0),
     ],
 )
+@pytest.mark.few(2)  # of 5, 0.1 s each
 def test_new_writes_the_cure_of_a_named_ply(name: str, cure: str, dt: float) -> None:
     made = call(*NEW, "--material", name, "--cure", cure)
     assert made.exit_code == 0, made.stderr

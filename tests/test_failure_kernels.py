@@ -194,6 +194,7 @@ MOTIONS = {"only bends": (False, False), "bends": (False, True), "stretches": (T
 
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("case", CASES)
+@pytest.mark.few(9)  # of 30, 0.05 s each
 def test_exposures_times_and_modes_of_all_states_are_numpys(case: str, motion: str) -> None:
     stretched, known = MOTIONS[motion]
     compiled, numpy = CASES[case](stretches=known)
@@ -202,6 +203,7 @@ def test_exposures_times_and_modes_of_all_states_are_numpys(case: str, motion: s
 
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("case", CASES)
+@pytest.mark.few(9)  # of 30, 0.01 s each
 def test_what_can_not_rise_is_left_out_without_a_change_of_a_bit(
     case: str, motion: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -287,6 +289,7 @@ def with_counts(monitor: CompiledMonitor, share: float) -> CompiledMonitor:
 @pytest.mark.parametrize("share", [0.9, 0.0])
 @pytest.mark.parametrize("stretches", [True, False])
 @pytest.mark.parametrize("case", CASES)
+@pytest.mark.few(12)  # of 40, 0.01 s each
 def test_the_largest_exposures_that_count_are_those_of_all_states(
     case: str, stretches: bool, share: float
 ) -> None:
@@ -464,6 +467,7 @@ def moving(kind: str) -> str:
         ("nonlinear", True),
     ],
 )
+@pytest.mark.few(2)  # of 7, 0.2 s each
 def test_a_run_knows_beforehand_whether_its_midplane_stretches(kind: str, stretches: bool) -> None:
     (problem,) = load_deck(moving(kind)).problems
     monitor = build_model(problem).failure

@@ -82,6 +82,7 @@ def test_a_search_reaches_the_threshold_of_each_toughness() -> None:
 
 @pytest.mark.parametrize("nonlinear", [False, True])
 @pytest.mark.parametrize("cured", [False, True])
+@pytest.mark.few(1)  # of 4, 1 s each
 def test_cases_that_differ_in_strengths_and_toughness_share_a_motion(
     nonlinear: bool, cured: bool, runs: list[Simulation]
 ) -> None:
@@ -134,6 +135,7 @@ def test_a_strength_is_that_of_the_ply_of_mate_wherever_its_cards_are() -> None:
         ({"yt": [-1.0, 0.5]}, "failure", "The strength YT is -1; it must be positive."),
     ],
 )
+@pytest.mark.few(1)  # of 3, 0.2 s each
 def test_an_invalid_value_fails_alone(
     values: dict[str, list[float]], measure: str | None, reason: str
 ) -> None:
@@ -160,6 +162,7 @@ def test_a_deck_without_the_segment_of_a_value_is_refused(name: str, reason: str
 
 
 @pytest.mark.parametrize(("exposure", "is_broken"), [(1.00005, False), (1.001, True)])
+@pytest.mark.few(1)  # of 2, 0.4 s each
 def test_a_run_and_a_sweep_agree_whether_an_exposure_is_above_1(
     exposure: float, is_broken: bool
 ) -> None:
@@ -182,6 +185,7 @@ def test_a_sweep_without_exposures_says_that_strengths_change_nothing() -> None:
         fecm.sweep(weak(), {"yt": [0.5], "s12": [0.5, 0.6]})
 
 
+@pytest.mark.long
 def test_the_scatter_of_toughness_has_its_share_in_the_scatter_of_the_margin(
     tmp_path: Path,
 ) -> None:

@@ -119,6 +119,7 @@ def test_rare_evaluations_bracket_the_first_failure_and_are_counted(every_step: 
 
 
 @pytest.mark.parametrize("where", ["interval", "outside"])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_fail_that_is_never_evaluated_in_contact_is_told(tmp_path: Path, where: str) -> None:
     text = failing(every=9000)
     if where == "outside":

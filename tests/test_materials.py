@@ -78,6 +78,7 @@ def test_every_ply_is_plausible_and_has_a_source(name: str) -> None:
 
 
 @pytest.mark.parametrize("units", NAMES)
+@pytest.mark.few(2)  # of 5, 0.08 s each
 def test_damage_adds_strengths_and_toughness_in_the_decks_units(units: str) -> None:
     pascal, metre = {
         "mm-N-s": (1e6, 1e-3),
@@ -201,6 +202,7 @@ def test_the_nearest_names_are_shown_for_an_unknown_one() -> None:
         ("S2-glass/epoxy", (0.30, 0.25)), ("Scotchply-1002", (0.30, 0.25)),
     ],
 )  # fmt: skip
+@pytest.mark.few(1)  # of 6, 0.3 s each
 def test_pucks_slopes_are_those_of_the_fibre(name: str, slopes: tuple[float, float]) -> None:
     for units in NAMES:
         card = deck_of("--material", name, "--damage", "--units", units).require(Allowables)
@@ -244,6 +246,7 @@ def test_a_system_that_is_not_consistent_is_refused_with_the_reason(given: str, 
     assert words in new("--material", "IM7/8552", "--units", given).stderr.replace("\n", " ")
 
 
+@pytest.mark.long
 def test_an_impact_in_the_units_of_an_explicit_code_is_that_in_millimetres_and_newtons() -> None:
     made = {
         units: fecm.impact(

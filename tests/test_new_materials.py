@@ -255,6 +255,7 @@ def test_physical_surfaces_of_gmsh_carry_laminates(tmp_path: Path) -> None:
     assert laminates(fecm.read_one(made.stdout)) == [1, 2, 1, 1, 2, 1]
 
 
+@pytest.mark.long
 def test_a_sweep_over_materials_of_layers_is_that_of_single_runs() -> None:
     deck = objects(fecm.Laminate("[0C/90G]s", {"C": "IM7/8552", "G": "E-glass/MY750"}, 0.25))
     swept = fecm.sweep(deck, {"layer_materials": ["[1/2]s", "[2/1]s"], "dt": [1e-7]}, history=True)
@@ -285,6 +286,7 @@ def test_a_layup_of_a_sweep_keeps_the_material_of_each_layer() -> None:
             deck.with_(layer_materials=numbers)
 
 
+@pytest.mark.long
 def test_the_picture_of_failure_shows_plates_of_several_laminates(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     deck = deck_of(*SANDWICH, "--zone", "10,10,30,20:[0/90/0/K/0/90/0]", "--damage")
@@ -296,6 +298,7 @@ def test_the_picture_of_failure_shows_plates_of_several_laminates(tmp_path: Path
     assert (tmp_path / "r.png").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_a_sweep_over_the_cure_of_several_materials_is_that_of_single_runs() -> None:
     deck = deck_of("--layup", "[0C/90G]s", "--material", "C=T300/914", "--material",
                    "G=E-glass/MY750", "--ply-thickness", ".25", "--cure", ":20", "--damage",
@@ -354,6 +357,7 @@ def test_plies_of_glass_keep_the_modes_of_fibre_and_matrix() -> None:
     assert one.mode in {"matrix tension", "matrix compression", "fibre tension", "shear"}
 
 
+@pytest.mark.long
 def test_summary_json_page_and_picture_name_the_metal_that_yields(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     soft = new(*LAW, *GLARE).stdout.replace("345.0", " 34.5").replace("199.0", " 19.9")
@@ -378,6 +382,7 @@ def test_summary_json_page_and_picture_name_the_metal_that_yields(tmp_path: Path
     assert "(2024-T3)" in picture
 
 
+@pytest.mark.long
 def test_the_material_of_a_ply_is_that_of_the_laminate_where_it_is() -> None:
     deck = deck_of(*GLARE[:-1], "--layup", "[0G/0G/0G]", "--zone", "10,10,30,20:[0M/0G/0M]",
                    "--damage")  # fmt: skip
@@ -395,6 +400,7 @@ def test_a_plate_of_one_metal_yields_and_needs_no_name() -> None:
 
 
 @pytest.mark.parametrize("name", MATERIALS)
+@pytest.mark.few(3)  # of 19, 0.08 s each
 def test_metals_and_foams_alone_are_isotropic(name: str) -> None:
     deck = deck_of("--layup", "[0]", "--material", name, "--ply-thickness", "2", "--units",
                    "mm-N-s")  # fmt: skip

@@ -150,6 +150,7 @@ def test_cells_have_the_stress_of_largest_magnitude_and_its_ply(
 
 
 @pytest.mark.parametrize("every", [1, 3, 10])
+@pytest.mark.few(1)  # of 3, 0.1 s each
 def test_every_time_step_has_the_largest_exposures_so_far(tmp_path: Path, every: int) -> None:
     program = PROGRAM.replace("NEXT", f"FAIL{every:11}\nNEXT")
     result = fecm.run_one(small(program, data=STRENGTHS + DATA_CARDS))
@@ -241,6 +242,7 @@ def test_a_damaged_result_is_refused_in_words(result: Result, tmp_path: Path) ->
         damaged.plies()
 
 
+@pytest.mark.long
 def test_xarray_opens_plies_and_patch_beside_the_other_groups(file: Path, result: Result) -> None:
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")

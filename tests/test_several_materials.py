@@ -347,6 +347,7 @@ def assert_same(
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_a_material_of_mats_that_repeats_that_of_mate_changes_nothing(solver: Solver) -> None:
     named = MATERIALS["IM7/8552"]
     strengths = named.allowables("mm-N-s")
@@ -364,6 +365,7 @@ def test_a_material_of_mats_that_repeats_that_of_mate_changes_nothing(solver: So
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_interleaved_zones_of_the_same_laminate_change_nothing(solver: Solver) -> None:
     layup = ((0.0, 0.5, 1), (90.0, 0.5, 1), (30.0, 0.5, 1))
     one = fecm.run_one(impact(), solver=solver)
@@ -478,6 +480,7 @@ def test_half_of_the_plate_is_computed_only_where_zones_are_symmetric(
 
 
 @compiled
+@pytest.mark.long
 def test_kernels_and_numpy_agree_on_a_nonlinear_plate_of_several_laminates() -> None:
     deck = unlike(model.Nonlinear(), words="DISP=10", steps=200)
     found, wanted = (fecm.run_one(deck, solver=s) for s in ("kernels", "numpy"))
@@ -564,6 +567,7 @@ def test_an_interface_of_unlike_materials_can_delaminate() -> None:
     assert laminate(HYBRID[0], [0.0, 0.0, 180.0, 90.0], [1.0] * 4).unlike_interfaces == 1
 
 
+@pytest.mark.long
 def test_a_run_of_several_laminates_that_is_stopped_goes_on_to_the_same_bytes(
     tmp_path: Path,
 ) -> None:
