@@ -65,6 +65,7 @@ def deck(program: str = WORDS) -> str:
           for slips in ("", "rod-dt tapes reload", "counter prop-contact rod-force")),
     ],
 )  # fmt: skip
+@pytest.mark.few(1)  # of 3, 0.6 s each
 def test_a_run_stopped_anywhere_goes_on_to_the_same_bytes(
     tmp_path: Path, slips: str, stops: Sequence[int]
 ) -> None:
@@ -91,6 +92,7 @@ def test_a_run_stopped_anywhere_goes_on_to_the_same_bytes(
     [("", 6), ("CURE\n-9.,\n,1.E-6,2.E-5\n\n", 1)],
     ids=["", "cure"],
 )
+@pytest.mark.few(1)  # of 2, 1 s each
 def test_a_stopped_run_with_a_patch_and_stresses_goes_on_to_the_same_bytes(
     cure: str, first: int, tmp_path: Path
 ) -> None:
@@ -199,6 +201,7 @@ def test_a_checkpoint_of_the_kernels_says_that_an_installation_lacks_them(
 
 
 @pytest.mark.parametrize("place", [0.02, 0.5, 0.999])
+@pytest.mark.few(1)  # of 3, 0.1 s each
 def test_a_spool_with_one_other_bit_is_refused(tmp_path: Path, place: float) -> None:
     path = tmp_path / "run.h5"
     with pytest.raises(StoppedError):
@@ -212,6 +215,7 @@ def test_a_spool_with_one_other_bit_is_refused(tmp_path: Path, place: float) -> 
 
 
 @pytest.mark.parametrize("lost", ["about", "identity", "values", "plate", "length", "recorder"])
+@pytest.mark.few(2)  # of 6, 0.1 s each
 def test_a_checkpoint_that_lacks_something_is_refused(tmp_path: Path, lost: str) -> None:
     path = tmp_path / "run.h5"
     with pytest.raises(StoppedError):
@@ -263,6 +267,7 @@ def altered(path: Path, change: str) -> None:
 @pytest.mark.parametrize(
     "change", ["deep", "stored", "place", "words", "shape", "type", "spool", "compressed"]
 )
+@pytest.mark.few(3)  # of 8, 0.1 s each
 def test_a_checkpoint_that_was_made_up_is_refused_in_one_line(
     tmp_path: Path, change: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -283,6 +288,7 @@ def test_a_checkpoint_that_was_made_up_is_refused_in_one_line(
 @pytest.mark.parametrize(
     "name", ["run.h5.spool", "run.h5.checkpoint", ".run.h5.partial.checkpoint"]
 )
+@pytest.mark.few(1)  # of 3, 0.2 s each
 def test_a_planted_link_leads_no_checkpoint_elsewhere(tmp_path: Path, name: str) -> None:
     victim = tmp_path / "victim"
     victim.write_text("precious")

@@ -25,6 +25,7 @@ def deck(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_a_call_in_this_process_gives_what_the_program_gives(deck: Path) -> None:
     deck.write_text(small(stop=False) + small(data=DATA_CARDS.replace("115.0", " 90.0")))
     for status, *arguments in (
@@ -228,6 +229,7 @@ def test_listing_mode_is_all_slips_and_report_mode_none() -> None:
 
 
 @pytest.mark.parametrize("arguments", [("--help",), ("diff", "small.h5", "small.h5")])
+@pytest.mark.few(1)  # of 2, 0.4 s each
 def test_a_reader_that_leaves_is_no_answer(arguments: tuple[str, ...], runs: Path) -> None:
     read, write = os.pipe()
     os.close(read)

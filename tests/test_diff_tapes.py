@@ -26,6 +26,7 @@ def originals(mode: str, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("mode", ["report", "listing"])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_a_result_is_the_original_programs_tapes_to_four_digits(
     runs: Path, tmp_path: Path, mode: str
 ) -> None:
@@ -46,6 +47,7 @@ def test_a_results_own_tapes_are_the_originals_text_in_report_order(
 
 
 @pytest.mark.parametrize("name", ["report", "listing", "small"])
+@pytest.mark.few(1)  # of 3, 0.2 s each
 def test_a_result_is_its_own_tapes_to_their_last_digit(
     runs: Path, tmp_path: Path, name: str
 ) -> None:
@@ -230,6 +232,7 @@ TAPES = {
     [*TAPES, "truncated", "binary", "empty", "foreign", "later", "folder", "both", "twice",
      pytest.param("pipe", marks=pytest.mark.links), "missing"],
 )  # fmt: skip
+@pytest.mark.few(7)  # of 21, 0.04 s each
 def test_what_cant_be_compared_exits_2_with_one_line(runs: Path, tmp_path: Path, name: str) -> None:
     wrong = spoiled(name, tmp_path, runs / "report.h5")
     for sides in ((runs / "report.h5", wrong), (wrong, runs / "report.h5")):

@@ -175,6 +175,7 @@ def test_a_file_is_synced_before_it_has_its_name_and_its_folder_after(
 
 @pytest.mark.linux
 @pytest.mark.parametrize("links", [True, False])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_files_are_closed_before_they_are_renamed_or_removed_where_that_is_needed(
     folder: Path, monkeypatch: pytest.MonkeyPatch, links: bool
 ) -> None:
@@ -285,6 +286,7 @@ def test_a_partial_file_that_somebody_removes_is_an_error(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS])
+@pytest.mark.few(1)  # of 2, 0.3 s each
 def test_every_disk_error_names_the_file(
     folder: Path, runs: Path, monkeypatch: pytest.MonkeyPatch, code: int
 ) -> None:

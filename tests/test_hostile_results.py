@@ -92,6 +92,7 @@ def test_a_crash_a_hang_and_too_much_memory_are_one_line_and_leave_no_file(
 
 @pytest.mark.linux
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_a_signal_ends_a_command_that_hangs_and_leaves_no_file(
     tmp_path: Path, number: signal.Signals
 ) -> None:
@@ -161,6 +162,7 @@ ATTRIBUTES = ["history/unsettled_steps", "energy/initial", "threshold/force", "t
 
 @pytest.mark.parametrize("attribute", ATTRIBUTES)
 @pytest.mark.parametrize("value", ["text", b"\xff", [1.0, 2.0], True], ids=repr)
+@pytest.mark.few(10)  # of 32, 0.04 s each
 def test_an_attribute_of_another_type_is_one_line(
     complete: Path, attribute: str, value: object, tmp_path: Path
 ) -> None:
@@ -266,6 +268,7 @@ def regions(file: h5py.File) -> None:
         (regions, "holds references"),
     ],
 )
+@pytest.mark.few(2)  # of 6, 0.06 s each
 def test_what_leads_to_another_object_is_refused_by_name(
     result: Path, edit: Callable[[h5py.File], None], reason: str
 ) -> None:

@@ -216,6 +216,7 @@ def foreign_items(file: h5py.File) -> None:
     "edit",
     [foreign_attributes, without_energy, without_attributes, foreign_items],
 )  # fmt: skip
+@pytest.mark.few(1)  # of 4, 0.3 s each
 def test_a_result_with_foreign_or_missing_parts_is_still_told(
     changed: Callable[[Edit], Path], edit: Edit
 ) -> None:

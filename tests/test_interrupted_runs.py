@@ -81,6 +81,7 @@ def test_killed_sweeps_with_damaged_parts_end_in_the_same_bytes(tmp_path: Path) 
 @pytest.mark.parametrize(
     "number", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGTERM]
 )
+@pytest.mark.long
 def test_an_interrupted_command_says_how_to_go_on_and_does(
     whole: Path, number: signal.Signals
 ) -> None:
@@ -181,6 +182,7 @@ def results_of(text: str, folder: Path) -> dict[str, bytes]:
     return results(folder)
 
 
+@pytest.mark.long
 def test_of_two_problems_the_finished_one_is_left_alone(interrupted: Path) -> None:
     times = [(interrupted / name).stat().st_mtime_ns for name in ("d.h5", "p.txt")]
     done = resumed(interrupted)
@@ -190,6 +192,7 @@ def test_of_two_problems_the_finished_one_is_left_alone(interrupted: Path) -> No
     assert results(interrupted) == results_of(TWO, interrupted / "whole")
 
 
+@pytest.mark.long
 def test_a_finished_problem_whose_result_was_deleted_is_run_again(interrupted: Path) -> None:
     (interrupted / "d.h5").unlink()
     (interrupted / "p.txt").unlink()
@@ -199,6 +202,7 @@ def test_a_finished_problem_whose_result_was_deleted_is_run_again(interrupted: P
     assert results(interrupted) == results_of(TWO, interrupted / "whole")
 
 
+@pytest.mark.long
 def test_a_finished_problem_that_was_edited_is_not_complete(interrupted: Path) -> None:
     edited = small(data=DATA_CARDS.replace("115.0", " 90.0"), stop=False) + small(SECOND)
     (interrupted / "d.inp").write_text(edited)
@@ -216,6 +220,7 @@ def test_a_finished_problem_that_was_edited_is_not_complete(interrupted: Path) -
 
 @pytest.mark.parametrize("name", ["d.h5", "p.txt"])
 @pytest.mark.parametrize("data", [b"", b"of last week"])
+@pytest.mark.few(1)  # of 4, 0.4 s each
 def test_an_empty_or_foreign_file_is_not_a_complete_result(
     name: str, data: bytes, interrupted: Path
 ) -> None:
@@ -230,6 +235,7 @@ def test_an_empty_or_foreign_file_is_not_a_complete_result(
 
 
 @pytest.mark.parametrize("change", ["damaged", "of the version before", "without fingerprints"])
+@pytest.mark.few(1)  # of 3, 0.1 s each
 def test_a_checkpoint_that_does_not_know_what_is_finished_is_refused(
     change: str, interrupted: Path
 ) -> None:
@@ -322,6 +328,7 @@ NUMPY = ("--solver", "numpy")
 
 
 @pytest.mark.posix
+@pytest.mark.long
 def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> None:
     short = LONG.read_text().replace("LOOP       4000", "LOOP       2000")
     (whole / "short.inp").write_text(short)

@@ -58,6 +58,7 @@ class StopAfter(fecm.Watch):
 
 
 @pytest.mark.parametrize("solver", ["numpy", "auto"])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_a_run_that_was_stopped_resumes_to_the_same_bytes(tmp_path: Path, solver: Solver) -> None:
     whole, stopped = tmp_path / "whole.h5", tmp_path / "stopped.h5"
     fecm.run(small(), output=whole, solver=solver)
@@ -84,6 +85,7 @@ def _interruptible() -> Iterator[None]:
 
 @pytest.mark.posix
 @pytest.mark.usefixtures("_interruptible")
+@pytest.mark.long
 def test_an_interrupt_of_a_run_with_a_file_leaves_a_checkpoint(tmp_path: Path) -> None:
     def interrupt(done: int, total: int) -> None:
         if 0 < done < total:
@@ -123,6 +125,7 @@ def test_a_sweep_that_was_stopped_resumes_to_the_same_bytes(tmp_path: Path) -> N
     ("after", "text"),
     [(2, r"after \d of 8 cases; the same call resumes"), (8, "the result of .* is complete")],
 )
+@pytest.mark.few(1)  # of 2, 0.3 s each
 def test_an_interrupt_of_a_sweep_says_what_is_left(tmp_path: Path, after: int, text: str) -> None:
     def interrupt(done: int, total: int) -> None:
         if done == after:
@@ -160,6 +163,7 @@ def test_without_resume_all_cases_are_computed_again(tmp_path: Path) -> None:
     assert path.exists()
 
 
+@pytest.mark.long
 def test_cases_are_run_in_full_from_python_too(tmp_path: Path) -> None:
     path = tmp_path / "s.h5"
     swept = fecm.sweep(IMPACT, {"k": [1e6, 2e6]}, output=path, full=[1])
@@ -167,6 +171,7 @@ def test_cases_are_run_in_full_from_python_too(tmp_path: Path) -> None:
     assert full.force.max() == pytest.approx(swept["peak_force"][1], rel=1e-9)
 
 
+@pytest.mark.long
 def test_the_price_of_a_run_and_a_sweep_is_known_before_they_start(tmp_path: Path) -> None:
     run = fecm.Run(IMPACT, output=tmp_path / "r.h5")
     result = run.execute()

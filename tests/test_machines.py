@@ -79,6 +79,7 @@ def validate(name: str, *outputs: str) -> None:
         (("--strict", "sound.inp", "doubtful.inp"), 1), (("--strict", "doubtful.inp"), 1),
     ],
 )  # fmt: skip
+@pytest.mark.few(2)  # of 6, 0.08 s each
 def test_check_reads_all_decks_and_exits_with_the_worst_status(
     folder: Path, decks: tuple[str, ...], status: int
 ) -> None:
@@ -253,6 +254,7 @@ def commands_in(log: str) -> list[str]:
 
 
 @pytest.mark.posix
+@pytest.mark.long
 def test_no_name_and_no_title_of_a_deck_is_a_command_to_the_runner_of_the_action(
     folder: Path,
 ) -> None:
@@ -305,6 +307,7 @@ CRASH = "echo 'Traceback: a crash' >&2; exit 1"
         ("echo '{}'; exit 2", 2),
     ],
 )
+@pytest.mark.few(2)  # of 5, 0.2 s each
 def test_a_crash_while_the_action_writes_sarif_is_shown_and_leaves_no_file(
     tmp_path: Path, program: str, status: int
 ) -> None:

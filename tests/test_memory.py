@@ -95,6 +95,7 @@ def plate(folder: Path, elements: int, macros: str, *options: str) -> Path:
 
 
 @pytest.mark.linux
+@pytest.mark.long
 def test_the_estimate_bounds_what_is_measured(tmp_path: Path) -> None:
     plates: list[tuple[str, int, tuple[str, ...]]] = [
         (IMPACT, 40, ()), (IMPACT, 20, ("--grading", "3", "--at", "2.1,1.3")), (STATIC, 20, ()),
@@ -195,6 +196,7 @@ def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
     assert not output.exists()
 
 
+@pytest.mark.long
 def test_gages_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # 4000 gages on 1008 elements took 119 MB more than none, 1000 gages 40 MB.
     monkeypatch.setattr(fecm._machine, "available_memory", lambda: 30 * MEGABYTE)
@@ -232,6 +234,7 @@ print(peak() - base)
     ("steps", "cases", "history"),
     [pytest.param(3000, 700, False, marks=pytest.mark.long), (1500, 1100, True)],
 )
+@pytest.mark.long
 def test_the_estimate_of_a_sweep_bounds_what_is_measured(
     steps: int, cases: int, history: bool
 ) -> None:

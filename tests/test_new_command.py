@@ -54,6 +54,7 @@ def held_in_plane(*options: str) -> dict[str, list[bool]]:
         (("--velocity", "10 ft/s"), 3048.0),
     ],
 )
+@pytest.mark.few(3)  # of 7, 0.05 s each
 def test_energy_and_velocity_take_a_unit(options: tuple[str, ...], velocity: float) -> None:
     made = new(*PLATE, "--layup", "[0/90]4s", *QUICK, *options)
     deck = fecm.read_one(made.stdout)
@@ -100,6 +101,7 @@ def test_a_unit_needs_the_decks_own() -> None:
     assert "--energy is '4J': give the deck's --units" in made.stderr
 
 
+@pytest.mark.long
 def test_a_fixtures_energy_in_millijoules_is_doubted() -> None:
     doubt = "where D7136 has 6.7: --energy is in mJ unless it has a unit"
     made = new(*D7136, *QUICK, "--energy", "10")
@@ -137,6 +139,7 @@ def test_a_bare_number_that_is_small_for_an_energy_is_doubted() -> None:
         assert "unless it has a unit" not in new(*plate, "--energy", meant).stderr
 
 
+@pytest.mark.long
 def test_the_patch_of_a_soft_tip_is_doubted() -> None:
     # Rubber of 20 MPa: 10 J on k = 97.8 indent by (2.5 E/k)^0.4 = 9.19, and (8 * 9.19)^(1/2) = 8.6.
     thin = (*THIN, *QUICK, "--energy", "10J")
@@ -195,6 +198,7 @@ def test_a_likely_mistake_of_an_option_is_named(options: tuple[str, ...], messag
     assert message in made.stderr
 
 
+@pytest.mark.long
 def test_sound_options_are_not_doubted() -> None:
     rubber = new(*D7136[:-2], *QUICK, "--contact", "estimate:8,20,.49")
     assert "looks like" not in rubber.stderr
@@ -257,6 +261,7 @@ def test_a_ply_thickness_in_another_unit_is_named_against_the_plates_side() -> N
     assert "the plate's shorter side is 100" in made.stderr
 
 
+@pytest.mark.long
 def test_a_toughness_stands_in_for_one_that_a_ply_does_not_have() -> None:
     ply = ("--material", "T700/2510", "--ply-thickness", "0.15", "--damage")
     assert MATERIALS["T700/2510"].delamination("mm-N-s") is None
@@ -273,6 +278,7 @@ STORED = (*D7136, "--damage", "--duration", "5e-6", "--dt", "1e-7")
 
 
 @pytest.mark.parametrize("mesh", ["6x4", "16x12"])
+@pytest.mark.few(1)  # of 2, 0.9 s each
 def test_damage_stores_ply_stresses_on_both_sides_of_the_edge_of_the_load(mesh: str) -> None:
     result = fecm.run_one(new(*STORED, "--mesh", mesh).stdout)
     under = result["plies/under_load"] == 1
@@ -281,6 +287,7 @@ def test_damage_stores_ply_stresses_on_both_sides_of_the_edge_of_the_load(mesh: 
     assert len(result["plies/time"]) == 25  # 50 steps, every second
 
 
+@pytest.mark.long
 def test_plies_says_how_often_damage_stores_ply_stresses_and_of_how_many_places() -> None:
     plain = new_deck(*STORED, "--plies", "0")
     words = [macro.word for macro in plain.macros]
@@ -310,6 +317,7 @@ NONLINEAR = (*PLATE, "--layup", "[0/90]2s", "--velocity", "3000", "--nonlinear")
         ("simple", "free", [False, False], [False, False]),
     ],
 )
+@pytest.mark.few(3)  # of 10, 0.1 s each
 def test_the_edges_of_a_plate_that_stretches_are_held_in_the_plane_as_asked(
     plate: tuple[str, ...],
     support: str,
@@ -344,6 +352,7 @@ def test_a_laminate_without_coupling_stays_held_everywhere() -> None:
     assert "--in-plane has no effect: the laminate is not coupled" in free.stderr
 
 
+@pytest.mark.long
 def test_a_coupled_laminate_slides_on_the_window_of_a_fixture() -> None:
     # N/mm on 20 x 12 elements, with u and v of the window's nodes restrained and freed by hand.
     for in_plane, expected in (("held", 3060.0), (None, 2199.0)):
@@ -402,6 +411,7 @@ def test_a_static_solution_pins_the_rigid_motion_in_the_plane_without_a_reaction
 @pytest.mark.parametrize(
     "layup", [pytest.param("[45/-45]8s", marks=pytest.mark.long), "[0_16/90_16]"]
 )
+@pytest.mark.long
 def test_the_default_duration_of_a_fixture_ends_after_the_contact(layup: str) -> None:
     # Indentation makes the contact of a stiff plate longer at a low energy than half a period.
     deck = new_deck(
@@ -424,6 +434,7 @@ def test_the_default_duration_of_a_fixture_ends_after_the_contact(layup: str) ->
 
 
 @pytest.mark.parametrize("options", [("--velocity", "0"), ("--law", "1e200,0,0,1.5")])
+@pytest.mark.few(1)  # of 2, 0.4 s each
 def test_an_impact_whose_contact_cannot_be_estimated_gets_half_periods(
     options: tuple[str, ...],
 ) -> None:
@@ -451,6 +462,7 @@ def test_an_impact_whose_contact_cannot_be_estimated_gets_half_periods(
         (("--shear", "full"), None),
     ],
 )
+@pytest.mark.few(2)  # of 6, 0.2 s each
 def test_the_shear_factor_is_written_beside_the_assumed_strains(
     options: tuple[str, ...], expected: Shear | None
 ) -> None:
@@ -502,6 +514,7 @@ def summary_of(deck: str) -> dict[str, float | None]:
         (("--support", "simple", "--shear", "full"), ""),
     ],
 )
+@pytest.mark.few(2)  # of 5, 0.1 s each
 def test_check_compares_with_equilibrium_where_that_is_cheap_and_has_a_meaning(
     options: tuple[str, ...], line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -533,6 +546,7 @@ THIN = ("--fixture", "D7136", "--mesh", "6x4", "--layup", "[45/0/-45/90]2s", "--
         ".131", "--material", "IM7/8552")  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_plate_that_deflects_beyond_0_3_h_stretches_and_the_note_says_so() -> None:
     soft, stiff = new(*THIN, "--energy", "10J"), new(*THIN, "--energy", "0.02J")
     assert fecm.read_one(soft.stdout).has(Nonlinear)
@@ -543,6 +557,7 @@ def test_a_plate_that_deflects_beyond_0_3_h_stretches_and_the_note_says_so() -> 
     assert "static estimate" not in stiff.stderr
 
 
+@pytest.mark.long
 def test_the_older_name_and_full_quadrature_decide_the_kinematics() -> None:
     named = new(*THIN, "--energy", "0.02J", "--kinematics", "von-karman").stdout
     assert named == new(*THIN, "--energy", "0.02J", "--nonlinear").stdout
@@ -555,6 +570,7 @@ def test_the_older_name_and_full_quadrature_decide_the_kinematics() -> None:
     assert "give one" in both.stderr
 
 
+@pytest.mark.long
 def test_a_plate_that_stretches_is_run_for_the_shorter_contact_of_its_static_curve() -> None:
     times = []
     for kinematics in ("linear", "von-karman"):
@@ -573,6 +589,7 @@ def test_a_plate_that_stretches_is_run_for_the_shorter_contact_of_its_static_cur
         (("--title", "mine"), "mine"),
     ],
 )
+@pytest.mark.few(1)  # of 3, 0.2 s each
 def test_a_title_names_plate_layup_ply_and_energy(options: tuple[str, ...], title: str) -> None:
     assert fecm.read_one(new(*THIN, *QUICK, "--energy", "10J", *options).stdout).title == title
 

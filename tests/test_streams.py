@@ -95,6 +95,7 @@ def folder(tmp_path: Path) -> Path:
     [long(">&-", 2), long("2>&-", 0), long(">&- 2>&-", 2), ("<&- >&- 2>&-", 2), (">/dev/full", 2),
      long("2>/dev/full", 0), long(">/dev/full 2>/dev/full", 2), long("| true", 2)],
 )  # fmt: skip
+@pytest.mark.few(1)  # of 2, 0.5 s each
 def test_a_run_is_done_whatever_becomes_of_its_streams(
     folder: Path, streams: str, status: int
 ) -> None:
@@ -114,6 +115,7 @@ def test_a_run_is_done_whatever_becomes_of_its_streams(
     [long("info d.h5", ">&-", 2), long("info d.h5", "2>&-", 0), long("check d.inp", ">&-", 2),
      ("tapes d.h5 -d t", ">&-", 2), long("--help", ">&-", 2), ("--help", "2>&-", 0)],
 )  # fmt: skip
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_other_commands_end_with_2_when_they_can_not_print(
     folder: Path, runs: Path, command: str, streams: str, status: int
 ) -> None:
@@ -130,6 +132,7 @@ def test_other_commands_end_with_2_when_they_can_not_print(
     [long("info none.h5", "2>&-"), ("info none.h5", "2>&1 | true"), ("run none.inp", "2>/dev/full"),
      long("run none.inp", "2>&-")],
 )  # fmt: skip
+@pytest.mark.few(1)  # of 2, 0.3 s each
 def test_a_message_that_nobody_reads_changes_no_exit_status(
     folder: Path, command: str, streams: str
 ) -> None:
@@ -243,6 +246,7 @@ main()
     [(IMPACT, "SIGTERM", 49), long(IMPACT, "SIGINT", 49), long(STATIC, "SIGHUP", 0),
      (EMPTY, "SIGINT", 0)],
 )  # fmt: skip
+@pytest.mark.few(1)  # of 2, 0.4 s each
 def test_the_first_signal_ends_a_loop_at_its_next_macro(
     folder: Path, macros: str, name: str, step: int
 ) -> None:
@@ -279,6 +283,7 @@ main()
 
 @pytest.mark.posix
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.few(1)  # of 3, 0.6 s each
 def test_a_signal_stops_a_case_that_is_run_in_full_and_keeps_the_sweep(
     folder: Path, number: signal.Signals
 ) -> None:
@@ -337,6 +342,7 @@ main()
     ],
 )
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.few(1)  # of 9, 0.4 s each
 def test_a_signal_in_a_callback_is_not_lost(
     module: str, name: str, arguments: tuple[str, ...], number: signal.Signals, folder: Path
 ) -> None:
