@@ -150,6 +150,7 @@ def test_the_quantities_on_the_page_of_units_are_the_same_in_every_system() -> N
 
 
 @pytest.mark.parametrize("row", table("units.md", "slip in a deck")[1:], ids=lambda row: row[0])
+@pytest.mark.few(2)  # of 13, 0.09 s each
 def test_a_slip_on_the_page_of_units_is_found(row: list[str]) -> None:
     _, right, wrong, codes = row
     lines = fecm.examples.path("drop-weight.inp").read_text(encoding="utf-8").splitlines()

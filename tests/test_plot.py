@@ -453,6 +453,7 @@ def test_the_same_picture_has_the_same_bytes(result: Result, tmp_path: Path, suf
 
 
 @pytest.mark.parametrize("kind", ["force", "loop", "energy"])
+@pytest.mark.few(1)  # of 3, 0.1 s each
 def test_pictures_of_a_contact_without_an_end_say_so(result: Result, kind: str) -> None:
     closed = run(small(data=DATA_CARDS + "UNIT\nin lbf s\n", program=LONG_PROGRAM))
 

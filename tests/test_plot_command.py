@@ -141,6 +141,7 @@ def without_rows(file: h5py.File) -> None:
         (without_rows, "force loop energy strain line contour surface thickness failure", "mesh"),
     ],
 )
+@pytest.mark.few(1)  # of 4, 0.8 s each
 def test_a_result_without_sense_is_drawn_or_is_one_line(
     file: Path, edit: Callable[[h5py.File], None], undrawn: str, drawn: str
 ) -> None:

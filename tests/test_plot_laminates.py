@@ -63,6 +63,7 @@ def test_thickness_shows_the_plies_of_the_elements_own_laminate(
 
 
 @pytest.mark.parametrize("quantity", ["", *NAMES[:1]])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_failure_leaves_plies_without_strengths_blank(plate: Result, quantity: str) -> None:
     figure: Any = plot(plate, "failure", quantity=quantity)
     (cells,) = [c for c in figure.axes[0].collections if c.get_array() is not None]

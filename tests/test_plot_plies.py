@@ -64,6 +64,7 @@ def test_thickness_shows_six_components_with_jumps_at_the_faces_of_plies(plies: 
 
 
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
+@pytest.mark.long
 def test_a_thin_line_has_the_residual_stresses_of_the_cure(plies: Result) -> None:
     text = plies.deck_text.replace("UNIT", "CURE\n-100.,\n,1.E-6,2.E-5\n\nUNIT")
     cured = run(text)
@@ -150,6 +151,7 @@ def area(polygon: Array) -> float:
 
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
 @pytest.mark.parametrize("points", [-3, -2, 2, 3])
+@pytest.mark.few(2)  # of 4, 0.1 s each
 def test_the_map_of_exposures_has_a_cell_around_every_point(points: int) -> None:
     data = (STRENGTHS + DATA_CARDS).replace("    3    3   -3", f"    3    3{points:5}")
     result = run(small(PROGRAM.replace("NEXT", "FAIL          1\nNEXT"), data=data))
@@ -171,6 +173,7 @@ def test_the_map_of_exposures_has_a_cell_around_every_point(points: int) -> None
 
 
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
+@pytest.mark.long
 def test_map_and_bars_stand_beside_each_other_below_a_lower_legend(failing: Result) -> None:
     figure: Any = plot(failing, "failure")
     figure.canvas.draw()

@@ -253,6 +253,7 @@ def same_again() -> str:
 
 
 @pytest.mark.usefixtures("_unrendered")
+@pytest.mark.long
 def test_equal_results_give_equal_pages() -> None:
     assert same_again() == same_again()
 
