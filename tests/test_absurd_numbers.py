@@ -39,6 +39,7 @@ CARDS = {
     ["5E-324", "1.7E308", *(pytest.param(v, marks=pytest.mark.long) for v in ("1E-300", "1E300"))],
 )
 @pytest.mark.parametrize(("card", "written"), [(c, w) for c, many in CARDS.items() for w in many])
+@pytest.mark.few(10)  # of 32, 0.03 s each
 def test_an_absurd_number_in_any_field_runs_or_is_refused_in_words(
     card: str, written: str, value: str
 ) -> None:

@@ -130,6 +130,7 @@ def test_a_new_deck_has_patch_and_assumed_shear_and_says_so_in_a_line(
 
 
 @pytest.mark.parametrize("options", [[], ["--grading", "2"], ["--at", "0.1,0.075"]])
+@pytest.mark.few(1)  # of 3, 0.2 s each
 def test_the_mesh_is_refined_to_the_radius_of_a_patch(options: list[str]) -> None:
     made = new(*PLATE, "--patch", "hertz:0.01", *options)
     assert "elements instead of 6x4: their sides at the patch are at most its radius 0.01" in (
@@ -286,6 +287,7 @@ def test_formatting_keeps_fields_blank_whose_default_is_not_zero(cards: str) -> 
     assert fecm.read_deck(deck.to_text()) == deck
 
 
+@pytest.mark.long
 def test_a_formatted_deck_runs_to_the_same_tapes(tmp_path: Path) -> None:
     formatted = tmp_path / "formatted.inp"
     made = call("fmt", str(APPENDIX), "-o", str(formatted))

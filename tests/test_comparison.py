@@ -116,6 +116,7 @@ def test_the_header_says_what_a_file_is_compared_with(
         ("time,force\n0,nan\n1,2\n", "is 'nan', not a finite number"),
     ],
 )
+@pytest.mark.few(3)  # of 7, 0.1 s each
 def test_files_that_can_not_be_compared_are_refused_in_one_line(
     tmp_path: Path, text: str, words: str
 ) -> None:

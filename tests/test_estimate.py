@@ -39,6 +39,7 @@ def test_the_row_of_the_run_is_the_run(tmp_path: Path) -> None:
     assert found["models"][1]["threshold"] == pytest.approx(full.threshold["force"], rel=1e-12)
 
 
+@pytest.mark.long
 def test_a_model_out_of_its_range_is_marked(tmp_path: Path) -> None:
     ratios = {"small": 1e-6, "medium": 1.0, "large": 1e3}
     expected = {"small": [True, False], "medium": [False, False], "large": [False, True]}

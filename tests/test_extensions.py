@@ -231,6 +231,7 @@ def test_constants_that_a_users_law_replaces_can_neither_vary_nor_be_fitted(
         fecm.identify(deck, [0.0, 1e-5, 2e-5], [0.0, 1.0, 2.0], [name], law=Dented())
 
 
+@pytest.mark.long
 def test_a_fit_under_a_users_law_finds_the_velocity_it_was_computed_with(deck: fecm.Deck) -> None:
     measured = fecm.run_one(deck.with_(velocity=100.0), law=Dented())
     found = fecm.identify(deck, measured.time, measured.force, ["velocity"], law=Dented())
@@ -242,6 +243,7 @@ def test_a_fit_under_a_users_law_finds_the_velocity_it_was_computed_with(deck: f
         )
 
 
+@pytest.mark.long
 def test_a_result_says_which_law_it_has(deck: fecm.Deck, tmp_path: Path) -> None:
     path = tmp_path / "own.h5"
     fecm.run_one(deck, law=Dented(), output=path)
@@ -273,6 +275,7 @@ def test_fail_evaluates_a_users_criterion_as_its_own(damaged: fecm.Deck, solver:
     np.testing.assert_array_equal(before["exposures/exposure"], rows[:, :count])
 
 
+@pytest.mark.long
 def test_a_users_criterion_is_in_the_file_and_in_the_summary(
     damaged: fecm.Deck, tmp_path: Path
 ) -> None:
@@ -361,6 +364,7 @@ def _five() -> list[Any]:
         ("norris", "criteria is 'norris'; pass a list"),
     ],
 )
+@pytest.mark.few(5)  # of 16, 0.02 s each
 def test_a_faulty_criterion_is_named_with_its_fault(
     damaged: fecm.Deck, given: Any, fault: str
 ) -> None:
@@ -560,6 +564,7 @@ def test_a_name_without_a_law_is_refused(installed: Path, name: str, fault: str)
     assert not (installed / "deck.h5").exists()
 
 
+@pytest.mark.long
 def test_an_interrupted_run_with_a_law_and_criteria_resumes_to_the_same_bytes(
     installed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -66,6 +66,7 @@ def document(
 @pytest.mark.parametrize(
     "separator", [",", ";", "\t", " "], ids=["comma", "semicolon", "tab", "blank"]
 )
+@pytest.mark.few(12)  # of 96, 0.05 s each
 def test_a_record_is_the_same_in_every_form(
     tmp_path: Path, separator: str, preamble: str, head: str
 ) -> None:

@@ -82,6 +82,7 @@ def assert_inside(seeds: Iterable[int]) -> Floats:
 
 
 @pytest.mark.filterwarnings("ignore:. of 240 points:fecm.FecmWarning")
+@pytest.mark.long
 def test_humps_near_half_of_the_peak_are_neither_refused_nor_shifted() -> None:
     # With it, the first hump is above half of the largest force; the long test has a hundred.
     assert_inside([3])
@@ -100,12 +101,14 @@ def test_100_noises_of_humps_are_fitted_within_four_standard_errors() -> None:
         ["k", "mass", "velocity", "delay"],
     ],
 )
+@pytest.mark.long
 def test_wrong_supports_are_called_a_wrong_model_and_not_a_delay(free: list[str]) -> None:
     with pytest.raises(IdentifyError, match="the model does not describe the data") as caught:
         fecm.identify(started("simple"), HUMPS, noisy(humps(), 0), free)
     assert "delay" not in str(caught.value)
 
 
+@pytest.mark.long
 def test_a_wrong_model_that_is_not_refused_is_not_accepted() -> None:
     force = humps()[::-1].copy()  # the largest hump first
     with pytest.warns(fecm.FecmWarning, match="the model does not describe the data"):
@@ -184,6 +187,7 @@ def found_inside(force: Floats, more: list[str], errors: float) -> fecm.Identifi
     return found
 
 
+@pytest.mark.long
 def test_an_offset_is_fitted_or_proposed() -> None:
     force = recorded(offset=BASE)
     found_inside(force, ["offset"], errors=3.0)
@@ -192,6 +196,7 @@ def test_an_offset_is_fitted_or_proposed() -> None:
     assert not found.accepted
 
 
+@pytest.mark.long
 def test_an_offset_shows_before_the_contact_though_the_model_is_wrong() -> None:
     time = np.concatenate([np.linspace(-4e-5, -1e-6, 40), HUMPS])
     force = np.concatenate([np.zeros(40), humps()]) + 30.0
@@ -200,6 +205,7 @@ def test_an_offset_shows_before_the_contact_though_the_model_is_wrong() -> None:
 
 
 @pytest.mark.parametrize("late", [pytest.param(LATE, marks=pytest.mark.long), -LATE])
+@pytest.mark.long
 def test_a_delay_is_fitted_or_proposed(late: float) -> None:
     force = recorded(delay=late)
     with pytest.warns(fecm.FecmWarning, match=rf"fit delay too: with delay {late:.1g}\d* s"):
@@ -207,6 +213,7 @@ def test_a_delay_is_fitted_or_proposed(late: float) -> None:
     assert not found.accepted
 
 
+@pytest.mark.long
 def test_delay_and_offset_are_fitted_together() -> None:
     found_inside(recorded(BASE, LATE), ["delay", "offset"], errors=3.0)
 
@@ -226,6 +233,7 @@ def test_points_of_the_contact_beyond_the_run_are_refused_and_others_are_not() -
 # Errors of the plate ------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_errors_of_the_plate_are_those_of_a_fit_with_another_plate() -> None:
     free = ["k", "mass", "velocity", "offset"]
     force = np.interp(LONG, *_heavy_force()) + BASE
@@ -268,6 +276,7 @@ def test_the_command_fails_where_values_are_not_to_be_used(tmp_path: Path) -> No
 # A filter that nobody named ----------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_filter_that_was_not_named_is_named_with_its_rise_time() -> None:
     clock = np.concatenate([[-1e-4], 1e-7 * np.arange(2401.0)])
     run = fecm.run_one(clamped(TRUE["k"], TRUE["mass"], TRUE["velocity"]))

@@ -128,6 +128,7 @@ DECKS = [*(ROOT / "decks").glob("*.inp"), *(ROOT / "fecm" / "examples").glob("*.
 
 
 @pytest.mark.parametrize("deck", DECKS, ids=lambda deck: deck.name)
+@pytest.mark.few(3)  # of 10, 0.03 s each
 def test_sound_decks_have_no_finding_of_these_rules(deck: Path) -> None:
     assert len(DECKS) > 8
     assert found(deck.read_text()) == []
@@ -170,6 +171,7 @@ IN_UNITS = [
 
 
 @pytest.mark.parametrize(("name", "system"), IN_UNITS)
+@pytest.mark.few(3)  # of 18, 0.2 s each
 def test_no_ply_of_the_catalogue_has_a_finding_in_any_units(name: str, system: str) -> None:
     has_damage = {"XT", "GIIc"} & MATERIALS[name].values.keys()
     text = new_deck(name, system, 0.25, damage=bool(has_damage))
@@ -193,6 +195,7 @@ OTHERS = {
 
 @pytest.mark.parametrize("units", [True, False], ids=["UNIT", "no UNIT"])
 @pytest.mark.parametrize(("elastic", "strong", "toughness"), OTHERS.values(), ids=OTHERS)
+@pytest.mark.few(2)  # of 14, 0.1 s each
 def test_other_materials_have_no_finding(
     elastic: tuple[float, ...], strong: tuple[float, ...], toughness: float, units: bool
 ) -> None:
@@ -250,6 +253,7 @@ ENDS = dict.fromkeys(("left", "right"), "simple")
      (30.0, ENDS, ["N430"]), (5.0, {}, ["N430"]), (30.0, {"left": "clamped"}, []),
      (0.01, ALL, ["W430"])],
 )  # fmt: skip
+@pytest.mark.few(3)  # of 8, 0.1 s each
 def test_the_thickness_is_compared_with_the_shorter_distance_between_supports(
     thickness: float, supports: dict[str, str], codes: list[str]
 ) -> None:

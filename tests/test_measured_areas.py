@@ -36,6 +36,7 @@ def test_the_groups_are_27_specimens() -> None:
 
 
 @pytest.mark.parametrize(("layup", "force"), FORCES)
+@pytest.mark.few(2)  # of 5, 0.2 s each
 def test_the_page_shows_the_threshold_of_the_first_group_of_a_layup(layup: str, force: str) -> None:
     row = next(row for row in GROUPS if row["layup"] == layup)
     deck = fecm.impact(

@@ -24,6 +24,7 @@ def table(path: Path, rows: int, columns: int, field: str) -> Path:
 
 @pytest.mark.parametrize("columns", [1, 2, 5])
 @pytest.mark.parametrize("field", ["2", "1.23456789012"])
+@pytest.mark.few(1)  # of 6, 0.5 s each
 def test_the_memory_of_a_table_is_within_its_estimate(
     tmp_path: Path, columns: int, field: str
 ) -> None:

@@ -111,6 +111,7 @@ def test_a_mistake_that_would_give_a_wrong_number_in_silence_is_named(text: str,
     ids=["moduli in Pa", "E1 in Pa", "angles in radians", "coordinates in inches", "nu12 = 3",
          "plies in m"],
 )  # fmt: skip
+@pytest.mark.few(2)  # of 6, 0.05 s each
 def test_what_only_the_time_step_had_caught_is_named_where_the_deck_lets_fecm_choose_it(
     text: str, code: str, without_unit: str
 ) -> None:

@@ -273,6 +273,7 @@ def test_a_choice_that_there_is_not_is_refused(choice: dict[str, Any], told: str
 
 
 @pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_a_finished_run_goes_with_its_plate_at_once(threads: int) -> None:
     # Thousands of runs in one process would fill its memory before cycles are looked for.
     gc.collect()

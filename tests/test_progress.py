@@ -129,6 +129,7 @@ def test_a_sweep_a_search_and_a_run_in_full_say_how_far_they_are(tmp_path: Path)
 
 
 @pytest.mark.usefixtures("_line_at_begin_and_end")
+@pytest.mark.long
 def test_a_fit_says_how_many_forces_it_has_computed(tmp_path: Path) -> None:
     for name in ("impact-patch.inp", "measured-force.csv"):
         call("example", name, cwd=tmp_path)

@@ -157,6 +157,7 @@ for shared, commands in %r.items():
 
 
 @pytest.mark.posix
+@pytest.mark.long
 def test_no_command_imports_what_it_does_not_use(runs: Path, tmp_path: Path) -> None:
     (tmp_path / "small.inp").write_text(small())
     shutil.copy(runs / "small.h5", tmp_path)
@@ -190,6 +191,7 @@ fecm.run_one(sys.argv[1])
 
 
 @pytest.mark.parametrize(("options", "times"), [([], 1), (["-W", "always"], 2)])
+@pytest.mark.few(1)  # of 2, 0.5 s each
 def test_a_finding_is_a_warning_once_in_a_process_unless_the_user_filters_otherwise(
     options: list[str], times: int, tmp_path: Path
 ) -> None:
@@ -362,6 +364,7 @@ def test_a_saved_sweep_is_the_file_that_the_sweep_would_have_written(tmp_path: P
         fecm.load_sweep(saved).save(saved)
 
 
+@pytest.mark.long
 def test_python_replaces_a_file_only_with_overwrite(tmp_path: Path) -> None:
     deck = tmp_path / "small.inp"
     deck.write_text(small())

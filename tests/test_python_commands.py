@@ -38,6 +38,7 @@ from tests.test_check import WRONG
     ],
     ids=lambda documented: str(documented.__qualname__),
 )
+@pytest.mark.few(2)  # of 7, 0.7 s each
 def test_the_examples_in_the_docstrings_give_what_they_show(
     documented: object, tmp_path: Path
 ) -> None:
@@ -98,6 +99,7 @@ def test_a_check_goes_to_another_process_and_back() -> None:
 # Comparisons -------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_comparison_in_python_says_what_the_command_prints(runs: Path) -> None:
     a, b = runs / "report.h5", runs / "listing.h5"
     found = fecm.diff(a, b)
@@ -112,6 +114,7 @@ def test_a_comparison_in_python_says_what_the_command_prints(runs: Path) -> None
     assert (force.at.step, force.at.index) == (10, (9,))
 
 
+@pytest.mark.long
 def test_results_in_memory_compare_as_their_files(tmp_path: Path, runs: Path) -> None:
     result = fecm.run_one(small())
     for other in (runs / "small.h5", fecm.load(runs / "small.h5"), fecm.run_one(small())):
@@ -126,6 +129,7 @@ def test_results_in_memory_compare_as_their_files(tmp_path: Path, runs: Path) ->
     assert in_memory.datasets == of_files.datasets
 
 
+@pytest.mark.long
 def test_sweeps_compare_in_memory_too(tmp_path: Path) -> None:
     sweep = fecm.sweep(small(), {"velocity": [50.0, 60.0]})
     sweep.save(tmp_path / "sweep.h5")
@@ -142,6 +146,7 @@ def test_sweeps_compare_in_memory_too(tmp_path: Path) -> None:
         fecm.diff(fecm.run_one(small()), sweep)
 
 
+@pytest.mark.long
 def test_tolerances_of_their_own_hold_in_the_order_of_the_mapping(runs: Path) -> None:
     a, b = runs / "report.h5", runs / "listing.h5"
     names = ["history/force", "history/velocity"]
@@ -277,6 +282,7 @@ fecm.sweep(deck, {{"layup": ["[0]", "[90]"]}}, workers=2, output="sweep.h5")
 """
 
 
+@pytest.mark.long
 def test_a_script_without_the_main_guard_is_told_so_and_leaves_no_result(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(UNGUARDED.format(deck=small()))
@@ -290,6 +296,7 @@ def test_a_script_without_the_main_guard_is_told_so_and_leaves_no_result(tmp_pat
     assert [file.name for file in tmp_path.iterdir()] == ["script.py"]
 
 
+@pytest.mark.long
 def test_commands_run_without_docstrings_and_under_a_notebooks_backend(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(small())
     surroundings = {

@@ -48,6 +48,7 @@ def test_a_script_has_a_title_and_is_short(script: Path) -> None:
 
 
 @pytest.mark.parametrize("script", RUNS)
+@pytest.mark.few(1)  # of 2, 0.7 s each
 def test_a_script_runs_and_warns_of_nothing(script: Path, tmp_path: Path) -> None:
     import matplotlib.pyplot as plt
 

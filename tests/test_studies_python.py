@@ -36,6 +36,7 @@ def test_the_examples_of_a_module_print_what_they_say(name: str) -> None:
 # Estimates ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_an_estimate_is_what_the_command_prints(tmp_path: Path) -> None:
     path = tmp_path / "d.inp"
     path.write_text(deck("DELA\n.5,\n", mesh=HELD))
@@ -128,6 +129,7 @@ def test_a_laminate_that_makes_no_waves_is_refused_in_the_words_of_the_call() ->
 # Indentation tests --------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_fit_is_what_the_command_prints_of_a_file_or_of_arrays(tmp_path: Path) -> None:
     path = fecm.examples.path("indentation-test")
     units = ("in", "lbf")

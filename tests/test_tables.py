@@ -123,6 +123,7 @@ def deck_of(lines: Sequence[str], keyword: str) -> str:
 
 @pytest.mark.parametrize("listing", [False, True], ids=["report", "listing"])
 @pytest.mark.parametrize("keyword", FIELDS)
+@pytest.mark.few(2)  # of 6, 0.2 s each
 def test_lines_in_blocks_give_the_values_and_findings_of_single_cards(
     keyword: str, listing: bool
 ) -> None:
@@ -134,6 +135,7 @@ def test_lines_in_blocks_give_the_values_and_findings_of_single_cards(
 
 
 @pytest.mark.parametrize("keyword", FIELDS)
+@pytest.mark.few(1)  # of 3, 0.1 s each
 def test_a_line_is_read_in_a_block_only_if_its_card_has_no_finding(keyword: str) -> None:
     chance = random.Random(11)
     fields, taken = FIELDS[keyword], 0

@@ -44,6 +44,7 @@ def test_equations_of_the_report_that_are_named_exist(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.few(3)  # of 7, 0.05 s each
 def test_every_formula_becomes_mathml_without_commands_that_are_left_over(page: Path) -> None:
     convert = pytest.importorskip("latex2mathml.converter").convert
     text = page.read_text(encoding="utf-8")

@@ -37,6 +37,7 @@ def numbers(line: str) -> list[float]:
     return [float(text) for text in re.findall(r"-?\d+\.?\d*(?:e[-+]\d+)?", line)]
 
 
+@pytest.mark.long
 def test_a_held_plate_is_warned_of_beyond_half_its_thickness(tmp_path: Path) -> None:
     impact = small(LONG, mesh=HELD)
     slow, result = notes(tmp_path, impact)
@@ -152,6 +153,7 @@ def test_the_reports_deck_is_within_the_assumptions(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("energy", "is_heavy"), [(540.0, True), (4000.0, False)])
+@pytest.mark.few(1)  # of 2, 0.3 s each
 def test_gravity_is_said_to_add_what_a_falling_mass_on_a_spring_shows(
     energy: float, *, is_heavy: bool
 ) -> None:
