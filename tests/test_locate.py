@@ -278,6 +278,7 @@ def strains_per_place_and_force(deck: fecm.Deck, found: fecm.Location) -> Floats
     return np.stack([*slopes, *strains(x, y, *hats)], axis=1)
 
 
+@pytest.mark.long
 def test_the_covariance_of_the_place_is_that_of_least_squares() -> None:
     """noise**2 (J' J)^-1 for two gages, with J computed without reciprocity."""
     deck = with_gages(panel(), *OFF_AXIS[:2])
@@ -416,6 +417,7 @@ def test_a_record_that_begins_before_the_impact_is_located() -> None:
     assert found.force[found.time <= 0.0].max() < 0.05 * found.peak_force
 
 
+@pytest.mark.long
 def test_a_gage_with_another_gain_is_found_out() -> None:
     strains, noise = scatter(struck_on_a_point()[1], NOISE / 4.0, seed=3)
     found = located(strains * [1.1, 1.0, 1.0], noise=noise, gains=True)
