@@ -189,6 +189,7 @@ SHORT = (7, 11, 21, 22, 31, 36)
 @pytest.mark.parametrize(
     "seed", [pytest.param(n, marks=() if n in SHORT else pytest.mark.long) for n in range(200)]
 )
+@pytest.mark.few(3)  # of 6, 0.2 s each
 def test_every_solver_gives_the_same_result(seed: int) -> None:
     compare(seed)
 

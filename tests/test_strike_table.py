@@ -46,6 +46,7 @@ def assert_same(found: fecm.SweepResult, wanted: fecm.SweepResult) -> None:
 
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
 @pytest.mark.parametrize("name", SWEEPS)
+@pytest.mark.few(4)  # of 7, 0.09 s each
 def test_a_sweep_is_that_of_strikes_made_one_by_one(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -496,6 +496,7 @@ main()
 
 
 @pytest.mark.posix
+@pytest.mark.long
 def test_a_sweep_that_is_interrupted_from_outside_ends_in_the_same_file(tmp_path: Path) -> None:
     (tmp_path / "plate.inp").write_text(small())
     varied = ("--vary", "k=1e6,2e6", "--vary", "layup=" + ",".join(LAYUPS[:3]))

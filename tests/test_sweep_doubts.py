@@ -38,7 +38,7 @@ def short() -> fecm.Deck:
      ("thickness", [3.0], "ply_thickness is the thickness of a ply"),
      ("laminate_thickness", [0.15, 0.2], "laminate_thickness = 0.15 is less than two plies")],
 )  # fmt: skip
-@pytest.mark.few(2)  # of 5, 0.2 s each
+@pytest.mark.few(1)  # of 5, 0.2 s each
 def test_a_swept_value_in_another_unit_is_told_once(
     name: str, values: list[float], text: str
 ) -> None:

@@ -113,6 +113,7 @@ def test_supports_in_the_plane_that_hold_some_nodes_only_are_kept() -> None:
     assert made.all(Boundary) == deck.all(Boundary)
 
 
+@pytest.mark.long
 def test_in_plane_unknowns_that_rest_do_not_limit_the_time_step() -> None:
     # Stiff plies at the faces: the plate is faster in its plane than in bending.
     held = model(LONG.read_text().replace("LOOP       4000", "LOOP       1000"))
