@@ -92,6 +92,7 @@ def history(radii: tuple[float, float]) -> dict[str, Floats]:
 
 
 @by_panel(PANELS[2])
+@pytest.mark.long
 def test_an_impact_is_that_of_the_series(radii: tuple[float, float]) -> None:
     dt = 2.13e-7
     found = decks.run_of_deck(struck(radii, mesh(60), dt, int(DURATION / dt) + 1))

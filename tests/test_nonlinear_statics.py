@@ -314,6 +314,7 @@ def test_rectangles_under_a_patch_follow_the_spectral_solution(name: str) -> Non
 
 
 @pytest.mark.parametrize("name", ["iso_100x100x2_clamped_immovable hert 1"])
+@pytest.mark.long
 def test_an_isotropic_plate_under_a_patch_is_within_two_ten_thousandths_on_a_fine_mesh(
     name: str,
 ) -> None:

@@ -175,7 +175,7 @@ def reference_frequencies() -> dict[Force, list[tuple[int, int, float]]]:
 
 
 @pytest.mark.parametrize("preload", reference_frequencies())
-@pytest.mark.few(2)  # of 4, 0.2 s each
+@pytest.mark.few(1)  # of 4, 0.2 s each
 def test_frequencies_under_a_preload_are_naviers(preload: Force) -> None:
     plate = replace(reference_plate(16), preload=preload)
     found = modes(plate, 24, consistent=False)

@@ -50,7 +50,7 @@ def curve_of(plate: PlateModel, shape: str, radius: float, deflection: float) ->
 
 
 @pytest.mark.parametrize(("edge", "shape"), [("clamped_immovable", "HERT"), ("ss_movable", "DISC")])
-@pytest.mark.few(1)  # of 2, 0.7 s each
+@pytest.mark.long
 def test_force_and_work_of_a_disc_are_those_of_the_axisymmetric_solution(
     edge: str, shape: str
 ) -> None:
