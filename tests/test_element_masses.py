@@ -175,7 +175,7 @@ def frequency(n: int, kind: int, *, lumped: bool = False) -> float:
         (12, (8, 16), 6.0, 1e-7),
     ],
 )
-@pytest.mark.few(3)  # of 7, 0.1 s each
+@pytest.mark.few(2)  # of 7, 0.1 s each
 def test_frequencies_with_consistent_mass_come_from_above_at_the_rate_of_theory(
     kind: int, meshes: tuple[int, ...], rate: float, ceiling: float
 ) -> None:

@@ -53,7 +53,7 @@ def peak(deck: str) -> float:
 
 
 @pytest.mark.parametrize("options", [["--patch", "none", "--shear", "full"], ["--patch", "hertz"]])
-@pytest.mark.few(1)  # of 2, 0.5 s each
+@pytest.mark.long
 def test_the_second_peak_is_that_of_the_plate_with_elements_of_half_the_side(
     tmp_path: Path, options: list[str]
 ) -> None:

@@ -87,6 +87,7 @@ def test_fronts_of_the_reports_deck_are_the_reference_files() -> None:
 @pytest.mark.parametrize(
     "command", [("dispersion",), ("speeds",), ("fronts", "--step", "45", "--time", "1e-6")]
 )
+@pytest.mark.few(1)  # of 3, 0.3 s each
 def test_a_layup_gives_what_the_same_laminate_in_a_deck_gives(command: tuple[str, ...]) -> None:
     deck, layup = (rows(call("waves", *command, *source)) for source in ((LONG,), LAMINATE))
     assert len(deck) == len(layup)
