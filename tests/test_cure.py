@@ -351,6 +351,7 @@ def test_cases_of_a_sweep_are_the_runs_of_their_decks(values: dict[str, list[flo
         assert found["validity"][row] == single.validity
 
 
+@pytest.mark.long
 def test_cases_that_differ_in_the_cure_alone_share_their_motion(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

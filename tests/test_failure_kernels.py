@@ -194,7 +194,7 @@ MOTIONS = {"only bends": (False, False), "bends": (False, True), "stretches": (T
 
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.few(9)  # of 30, 0.05 s each
+@pytest.mark.few(6)  # of 30, 0.05 s each
 def test_exposures_times_and_modes_of_all_states_are_numpys(case: str, motion: str) -> None:
     stretched, known = MOTIONS[motion]
     compiled, numpy = CASES[case](stretches=known)
@@ -467,7 +467,7 @@ def moving(kind: str) -> str:
         ("nonlinear", True),
     ],
 )
-@pytest.mark.few(2)  # of 7, 0.2 s each
+@pytest.mark.few(1)  # of 7, 0.2 s each
 def test_a_run_knows_beforehand_whether_its_midplane_stretches(kind: str, stretches: bool) -> None:
     (problem,) = load_deck(moving(kind)).problems
     monitor = build_model(problem).failure
