@@ -162,7 +162,7 @@ ATTRIBUTES = ["history/unsettled_steps", "energy/initial", "threshold/force", "t
 
 @pytest.mark.parametrize("attribute", ATTRIBUTES)
 @pytest.mark.parametrize("value", ["text", b"\xff", [1.0, 2.0], True], ids=repr)
-@pytest.mark.few(10)  # of 32, 0.04 s each
+@pytest.mark.few(5)  # of 32, 0.04 s each
 def test_an_attribute_of_another_type_is_one_line(
     complete: Path, attribute: str, value: object, tmp_path: Path
 ) -> None:

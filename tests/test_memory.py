@@ -376,6 +376,7 @@ def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
     assert [path.name for path in tmp_path.iterdir()] == ["small.inp"]
 
 
+@pytest.mark.long
 def test_matrices_that_do_not_fit_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -434,7 +434,7 @@ def test_the_default_duration_of_a_fixture_ends_after_the_contact(layup: str) ->
 
 
 @pytest.mark.parametrize("options", [("--velocity", "0"), ("--law", "1e200,0,0,1.5")])
-@pytest.mark.few(1)  # of 2, 0.4 s each
+@pytest.mark.long
 def test_an_impact_whose_contact_cannot_be_estimated_gets_half_periods(
     options: tuple[str, ...],
 ) -> None:

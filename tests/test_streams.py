@@ -283,7 +283,7 @@ main()
 
 @pytest.mark.posix
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.few(1)  # of 3, 0.6 s each
+@pytest.mark.long
 def test_a_signal_stops_a_case_that_is_run_in_full_and_keeps_the_sweep(
     folder: Path, number: signal.Signals
 ) -> None:
@@ -299,6 +299,7 @@ def test_a_signal_stops_a_case_that_is_run_in_full_and_keeps_the_sweep(
 
 
 @pytest.mark.posix
+@pytest.mark.long
 def test_a_signal_while_a_sweep_is_written_ends_the_program_after_it(folder: Path) -> None:
     (folder / "d.inp").write_text(small())
     command = ("sweep", "d.inp", "--vary", "k=1e6", "-o", "s.h5")
