@@ -258,6 +258,7 @@ def test_a_result_says_which_law_it_has(deck: fecm.Deck, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.few(1)  # of 2, 0.4 s each
 def test_fail_evaluates_a_users_criterion_as_its_own(damaged: fecm.Deck, solver: Solver) -> None:
     result = fecm.run_one(damaged, criteria=[norris, copied_puck], solver=solver)
     own, known = (result[f"failure/{name}/exposure"] for name in ("copied_puck", "puck"))

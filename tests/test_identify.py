@@ -115,6 +115,7 @@ def test_true_parameters_are_within_two_standard_errors_in_95_of_100_cases() -> 
 # What a measurement does not determine -----------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_contact_below_alpha_p_neither_determines_it_nor_describes_a_plastic_one() -> None:
     hard = plate(12, 4e-7, **{**TRUE, "alpha_p": 1.0})
     result = fecm.run_one(hard)

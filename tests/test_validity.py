@@ -117,6 +117,7 @@ def test_an_indentation_beyond_a_quarter_of_the_thickness_is_told(tmp_path: Path
 
 
 @pytest.mark.parametrize(("strength", "exceeded"), [("1e9", False), ("1e3", True)])
+@pytest.mark.few(1)  # of 2, 0.2 s each
 def test_an_exposure_above_1_is_told_once(tmp_path: Path, strength: str, exceeded: bool) -> None:
     allowables = ",".join([strength] * 5)
     program = LONG.replace("NEXT", "FAIL,,20\nNEXT")
