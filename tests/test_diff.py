@@ -200,7 +200,6 @@ def test_node_numbers_and_steps_must_be_equal_at_any_tolerance(
     assert "element 3, position 9" in line_about(done, "mesh/elements")
 
 
-@pytest.mark.long
 def test_a_dataset_that_one_file_alone_has_is_a_difference(
     pair: tuple[Path, Callable[[Edit], Path]],
 ) -> None:
@@ -424,7 +423,6 @@ def test_a_residue_of_the_energies_is_judged_by_the_energies(
     assert entry["relative"] == pytest.approx(2e-4, rel=2e-3)
 
 
-@pytest.mark.long
 def test_resultants_of_the_midplane_are_judged_by_those_of_bending(tmp_path: Path) -> None:
     a, b = tmp_path / "a.h5", tmp_path / "b.h5"
     plate = small(program=PROGRAM.replace("NEXT", "STRE          5\nNEXT"))

@@ -276,7 +276,6 @@ def test_fail_evaluates_a_users_criterion_as_its_own(damaged: fecm.Deck, solver:
     np.testing.assert_array_equal(before["exposures/exposure"], rows[:, :count])
 
 
-@pytest.mark.long
 def test_a_users_criterion_is_in_the_file_and_in_the_summary(
     damaged: fecm.Deck, tmp_path: Path
 ) -> None:

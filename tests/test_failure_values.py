@@ -185,7 +185,6 @@ def test_a_sweep_without_exposures_says_that_strengths_change_nothing() -> None:
         fecm.sweep(weak(), {"yt": [0.5], "s12": [0.5, 0.6]})
 
 
-@pytest.mark.long
 def test_the_scatter_of_toughness_has_its_share_in_the_scatter_of_the_margin(
     tmp_path: Path,
 ) -> None:

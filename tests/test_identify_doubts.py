@@ -196,7 +196,6 @@ def test_an_offset_is_fitted_or_proposed() -> None:
     assert not found.accepted
 
 
-@pytest.mark.long
 def test_an_offset_shows_before_the_contact_though_the_model_is_wrong() -> None:
     time = np.concatenate([np.linspace(-4e-5, -1e-6, 40), HUMPS])
     force = np.concatenate([np.zeros(40), humps()]) + 30.0
@@ -276,7 +275,6 @@ def test_the_command_fails_where_values_are_not_to_be_used(tmp_path: Path) -> No
 # A filter that nobody named ----------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_a_filter_that_was_not_named_is_named_with_its_rise_time() -> None:
     clock = np.concatenate([[-1e-4], 1e-7 * np.arange(2401.0)])
     run = fecm.run_one(clamped(TRUE["k"], TRUE["mass"], TRUE["velocity"]))

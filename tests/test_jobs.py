@@ -171,7 +171,6 @@ def test_cases_are_run_in_full_from_python_too(tmp_path: Path) -> None:
     assert full.force.max() == pytest.approx(swept["peak_force"][1], rel=1e-9)
 
 
-@pytest.mark.long
 def test_the_price_of_a_run_and_a_sweep_is_known_before_they_start(tmp_path: Path) -> None:
     run = fecm.Run(IMPACT, output=tmp_path / "r.h5")
     result = run.execute()

@@ -196,7 +196,6 @@ def test_a_free_plate_moves_under_an_impulse_as_a_rigid_body() -> None:
 # What it decides ---------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_no_interval_of_a_probability_excludes_that_of_whole_runs() -> None:
     whole = swept().random
     assert whole is not None

@@ -53,7 +53,7 @@ def peak(deck: str) -> float:
 
 
 @pytest.mark.parametrize("options", [["--patch", "none", "--shear", "full"], ["--patch", "hertz"]])
-@pytest.mark.long
+@pytest.mark.few(1)  # of 2, 0.5 s each
 def test_the_second_peak_is_that_of_the_plate_with_elements_of_half_the_side(
     tmp_path: Path, options: list[str]
 ) -> None:
@@ -144,7 +144,6 @@ def test_the_largest_force_of_a_run_that_is_cut_off_is_not_called_a_peak(tmp_pat
     assert "lower bounds" in done.stderr
 
 
-@pytest.mark.long
 def test_exposures_on_both_meshes_are_those_of_runs_on_them() -> None:
     options = ("--damage", "--patch", "disc:10", "--dt", "5e-8", "--kinematics", "linear")
     coarse, fine = new("4x4", *options), new("8x8", *options)

@@ -286,7 +286,6 @@ def test_a_layup_of_a_sweep_keeps_the_material_of_each_layer() -> None:
             deck.with_(layer_materials=numbers)
 
 
-@pytest.mark.long
 def test_the_picture_of_failure_shows_plates_of_several_laminates(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     deck = deck_of(*SANDWICH, "--zone", "10,10,30,20:[0/90/0/K/0/90/0]", "--damage")

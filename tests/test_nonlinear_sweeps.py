@@ -50,7 +50,6 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return taken
 
 
-@pytest.mark.long
 def test_every_case_is_a_full_run_of_the_stretched_plate(runs: list[float]) -> None:
     velocities = [300.0, 600.0]
     swept = fecm.sweep(DECK, {"velocity": velocities}, history=True, measure="max_deflection")

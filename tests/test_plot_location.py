@@ -138,7 +138,6 @@ def test_the_outline_has_the_sides_of_the_plate_and_none_inside() -> None:
     }
 
 
-@pytest.mark.long
 def test_of_many_gages_twelve_are_drawn_and_a_note_says_so() -> None:
     count = 14
     cards = "".join(f"{n}, {0.1 * n:.1f}, 0.5, .053, 0.\n" for n in range(1, count + 1))

@@ -421,7 +421,6 @@ def test_impossible_draws_are_refused_before_a_sensitivity_study(folder: Path) -
     assert "lognormal" in done.stderr
 
 
-@pytest.mark.long
 def test_the_cost_is_told_beforehand(folder: Path) -> None:
     done = sweep(folder, "--random", "e1=normal:17.5e6,5e5", "--samples", 16, "--design", "mc")
     assert "16 draws need 16 plates, because e1 is random" in done.stderr

@@ -186,7 +186,6 @@ def test_a_model_with_all_its_modes_is_not_told_to_take_more() -> None:
         ReducedModel(40, {**row, **full}).check()
 
 
-@pytest.mark.long
 def test_a_case_does_not_depend_on_the_others(swept: fecm.SweepResult) -> None:
     others = {"velocity": [900.0, 450.0], "k": [5e4]}
     again = fecm.sweep(DECK, others, model="reduced", modes=ENOUGH, measure="max_deflection")

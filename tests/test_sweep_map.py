@@ -169,7 +169,6 @@ def test_markers_of_the_largest_values_are_not_cut(plane: SweepResult) -> None:
     assert plot(sweep).axes[0].get_ylim() == (0.0, pytest.approx(10.5))
 
 
-@pytest.mark.long
 def test_thresholds_of_different_plates_are_drawn_case_by_case() -> None:
     layups = ["[0/90]", "[0/0]"]
     sweep = fecm.sweep(TOUGH, {"layup": layups, "velocity": [20.0, 200.0]})

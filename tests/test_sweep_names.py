@@ -237,7 +237,6 @@ def test_loops_that_can_not_keep_the_duration_are_told() -> None:
 # Columns on request ------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_measured_columns_are_those_of_full_runs(tmp_path: Path) -> None:
     deck, speeds = gaged(), [1500.0, 3000.0]
     quick = fecm.sweep(deck, {"velocity": speeds}, measure=("gages", "max_deflection"))
