@@ -243,7 +243,6 @@ def test_a_fit_under_a_users_law_finds_the_velocity_it_was_computed_with(deck: f
         )
 
 
-@pytest.mark.long
 def test_a_result_says_which_law_it_has(deck: fecm.Deck, tmp_path: Path) -> None:
     path = tmp_path / "own.h5"
     fecm.run_one(deck, law=Dented(), output=path)

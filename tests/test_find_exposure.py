@@ -137,7 +137,6 @@ def test_a_run_that_leaves_the_exposure_open_is_repeated_longer() -> None:
     )
 
 
-@pytest.mark.long
 def test_few_evaluations_and_short_runs_find_no_velocity() -> None:
     rare = fecm.sweep(failing(every=40, steps=400), until={"exposure": 1.0})
     assert "FAIL was evaluated" in rare["status"][0]

@@ -167,7 +167,6 @@ def test_a_standard_error_above_the_value_is_refused() -> None:
 # The sensor --------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_the_filter_and_the_delay_of_the_measurement_are_part_of_the_fit() -> None:
     clock = 1e-7 * np.arange(-800.0, 1601.0)
     force = np.interp(clock, np.append(0.0, TIME), np.append(0.0, measured()))

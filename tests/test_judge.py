@@ -237,7 +237,6 @@ def test_a_search_ends_where_no_run_is_long_enough() -> None:
     assert found["validity"].tolist() == ["failed"]
 
 
-@pytest.mark.long
 def test_cases_together_and_full_runs_are_judged_alike() -> None:
     for duration in (3e-3, WHOLE):
         deck, speeds = soft(duration), [150.0, 600.0, 2330.0]

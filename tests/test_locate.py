@@ -278,7 +278,6 @@ def strains_per_place_and_force(deck: fecm.Deck, found: fecm.Location) -> Floats
     return np.stack([*slopes, *strains(x, y, *hats)], axis=1)
 
 
-@pytest.mark.long
 def test_the_covariance_of_the_place_is_that_of_least_squares() -> None:
     """noise**2 (J' J)^-1 for two gages, with J computed without reciprocity."""
     deck = with_gages(panel(), *OFF_AXIS[:2])

@@ -163,7 +163,6 @@ def test_kinds_of_runs_and_of_locations_do_not_show_each_other() -> None:
         draw("location", {"it": run(small())})
 
 
-@pytest.mark.long
 def test_the_command_draws_the_file_as_the_method_draws_the_location(tmp_path: Path) -> None:
     found = located()
     found.save(tmp_path / "located.h5")

@@ -137,7 +137,6 @@ def test_too_few_modes_are_refused_before_the_sweep(monkeypatch: pytest.MonkeyPa
     assert [task.numbers for task in ran] == [(3,)] * 2 + [(0,)] * 2
 
 
-@pytest.mark.long
 def test_cases_of_energies_at_which_the_model_does_not_hold_are_run_in_full(
     tmp_path: Path,
 ) -> None:
