@@ -20,7 +20,7 @@ settings.load_profile("fecm")
 
 
 def beyond(cases: list[pytest.Item], count: int) -> list[pytest.Item]:
-    """All cases but so many, which lie at equal distances from the first to the last."""
+    """Return the cases of a family but for `count`, at equal distances from first to last."""
     step = (len(cases) - 1) / max(count - 1, 1)
     kept = {int(n * step + 0.5) for n in range(count)}
     return [case for n, case in enumerate(cases) if n not in kept]

@@ -287,7 +287,6 @@ def test_formatting_keeps_fields_blank_whose_default_is_not_zero(cards: str) -> 
     assert fecm.read_deck(deck.to_text()) == deck
 
 
-@pytest.mark.long
 def test_a_formatted_deck_runs_to_the_same_tapes(tmp_path: Path) -> None:
     formatted = tmp_path / "formatted.inp"
     made = call("fmt", str(APPENDIX), "-o", str(formatted))

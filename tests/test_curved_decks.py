@@ -243,7 +243,6 @@ def test_summaries_say_radii_and_rise(curved: fecm.Result) -> None:
     assert "  curved panel        Rx 100 mm, Ry -200 mm, rise 1.375 mm" in summary.lines()
 
 
-@pytest.mark.long
 def test_an_estimate_says_which_model_is_flat() -> None:
     flat, bent = fecm.estimate(panel()), fecm.estimate(panel(radius_x=100.0))
     assert bent.remarks["curvature"].endswith("the infinite plate is flat")

@@ -57,7 +57,6 @@ def test_the_static_deflection_is_that_of_the_series(radii: tuple[float, float])
 
 
 @by_panel(PANELS[3])
-@pytest.mark.long
 def test_membrane_forces_and_moments_are_those_of_the_series(radii: tuple[float, float]) -> None:
     deck = panel(radii, f"{STATIC} STRE", fine_middle(16), load=1.0, points=2)
     found = decks.run_of_deck(deck)

@@ -150,7 +150,6 @@ def test_ply_stresses_have_the_strains_of_the_radii_and_their_derivatives() -> N
 
 @pytest.mark.skipif(kernels.LIBRARY is None, reason="needs the compiled kernels")
 @pytest.mark.parametrize("odd", [False, pytest.param(True, marks=pytest.mark.long)])
-@pytest.mark.long
 def test_the_kernels_have_the_forces_of_numpy(odd: bool) -> None:
     """On congruent and other elements, by every rule, with u and v free or all restrained.
 

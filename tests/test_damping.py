@@ -147,7 +147,6 @@ def test_the_impulse_response_of_a_sweep_is_damped() -> None:
     assert np.abs(full - run(STEPS).force).max() > 1e-3 * full.max()
 
 
-@pytest.mark.long
 def test_a_stopped_damped_run_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     text = damped(STEPS.replace("LOOP        100", "LOOP       1100"), "2e4,")
     run_stopped(text, tmp_path / "whole.h5")

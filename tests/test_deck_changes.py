@@ -227,7 +227,6 @@ def test_a_text_in_the_place_of_a_number_is_refused_where_it_is_given(
         make("5.5")
 
 
-@pytest.mark.long
 def test_a_nonlinear_deck_without_nonl_moves_as_the_deck_that_is_made_linear() -> None:
     common = QUICK | {"velocity": 2e4, "duration": 1e-4}
     linear, nonlinear = (

@@ -82,7 +82,6 @@ def assert_inside(seeds: Iterable[int]) -> Floats:
 
 
 @pytest.mark.filterwarnings("ignore:. of 240 points:fecm.FecmWarning")
-@pytest.mark.long
 def test_humps_near_half_of_the_peak_are_neither_refused_nor_shifted() -> None:
     # With it, the first hump is above half of the largest force; the long test has a hundred.
     assert_inside([3])
@@ -108,7 +107,6 @@ def test_wrong_supports_are_called_a_wrong_model_and_not_a_delay(free: list[str]
     assert "delay" not in str(caught.value)
 
 
-@pytest.mark.long
 def test_a_wrong_model_that_is_not_refused_is_not_accepted() -> None:
     force = humps()[::-1].copy()  # the largest hump first
     with pytest.warns(fecm.FecmWarning, match="the model does not describe the data"):
@@ -187,7 +185,6 @@ def found_inside(force: Floats, more: list[str], errors: float) -> fecm.Identifi
     return found
 
 
-@pytest.mark.long
 def test_an_offset_is_fitted_or_proposed() -> None:
     force = recorded(offset=BASE)
     found_inside(force, ["offset"], errors=3.0)
@@ -212,7 +209,6 @@ def test_a_delay_is_fitted_or_proposed(late: float) -> None:
     assert not found.accepted
 
 
-@pytest.mark.long
 def test_delay_and_offset_are_fitted_together() -> None:
     found_inside(recorded(BASE, LATE), ["delay", "offset"], errors=3.0)
 

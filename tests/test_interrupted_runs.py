@@ -182,7 +182,6 @@ def results_of(text: str, folder: Path) -> dict[str, bytes]:
     return results(folder)
 
 
-@pytest.mark.long
 def test_of_two_problems_the_finished_one_is_left_alone(interrupted: Path) -> None:
     times = [(interrupted / name).stat().st_mtime_ns for name in ("d.h5", "p.txt")]
     done = resumed(interrupted)
@@ -192,7 +191,6 @@ def test_of_two_problems_the_finished_one_is_left_alone(interrupted: Path) -> No
     assert results(interrupted) == results_of(TWO, interrupted / "whole")
 
 
-@pytest.mark.long
 def test_a_finished_problem_whose_result_was_deleted_is_run_again(interrupted: Path) -> None:
     (interrupted / "d.h5").unlink()
     (interrupted / "p.txt").unlink()
@@ -202,7 +200,6 @@ def test_a_finished_problem_whose_result_was_deleted_is_run_again(interrupted: P
     assert results(interrupted) == results_of(TWO, interrupted / "whole")
 
 
-@pytest.mark.long
 def test_a_finished_problem_that_was_edited_is_not_complete(interrupted: Path) -> None:
     edited = small(data=DATA_CARDS.replace("115.0", " 90.0"), stop=False) + small(SECOND)
     (interrupted / "d.inp").write_text(edited)
@@ -328,7 +325,6 @@ NUMPY = ("--solver", "numpy")
 
 
 @pytest.mark.posix
-@pytest.mark.long
 def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> None:
     short = LONG.read_text().replace("LOOP       4000", "LOOP       2000")
     (whole / "short.inp").write_text(short)

@@ -85,7 +85,6 @@ def _interruptible() -> Iterator[None]:
 
 @pytest.mark.posix
 @pytest.mark.usefixtures("_interruptible")
-@pytest.mark.long
 def test_an_interrupt_of_a_run_with_a_file_leaves_a_checkpoint(tmp_path: Path) -> None:
     def interrupt(done: int, total: int) -> None:
         if 0 < done < total:
@@ -163,7 +162,6 @@ def test_without_resume_all_cases_are_computed_again(tmp_path: Path) -> None:
     assert path.exists()
 
 
-@pytest.mark.long
 def test_cases_are_run_in_full_from_python_too(tmp_path: Path) -> None:
     path = tmp_path / "s.h5"
     swept = fecm.sweep(IMPACT, {"k": [1e6, 2e6]}, output=path, full=[1])
@@ -197,8 +195,7 @@ def test_a_fit_is_a_job_with_a_price_that_a_watch_may_stop() -> None:
         job.execute(StopAfter(8))
     watch = StopAfter()
     fit = job.execute(watch)
-    time, force = job.measurement.time, job.measurement.force
-    assert fit.values == fecm.identify(deck, time, force, "k", "first-order:5e-6").values
+    assert fit.values["k"] == pytest.approx(1.912e6, rel=0.02)  # of the deck that was measured
     assert watch.done >= 8
     with pytest.raises(StudyError, match="can't fit mess; fit different ones of"):
         fecm.IdentificationJob(deck, table, "mess")

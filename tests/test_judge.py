@@ -220,7 +220,6 @@ def test_bounds_hold_whatever_the_open_draws_are() -> None:
     assert high == max(upper for _, upper in every)
 
 
-@pytest.mark.long
 def test_a_velocity_is_found_whatever_the_duration_of_the_deck() -> None:
     energies = []
     for duration in (3e-3, WHOLE):

@@ -227,7 +227,6 @@ def test_a_run_is_that_of_numpy(name: str) -> None:
 
 
 @compiled
-@pytest.mark.long
 def test_a_run_does_not_depend_on_the_number_of_threads(tmp_path: Path) -> None:
     # So many elements that the threads share them.
     deck = element_deck(distorted_square(34, 34), (3, 2, 3), steps=40).replace("2.0E-7", "5.0E-8")

@@ -102,7 +102,6 @@ def test_the_verdict_is_open_where_the_band_of_the_mesh_has_1(
     assert failure_verdict([one]) is expected
 
 
-@pytest.mark.long
 def test_the_exposure_at_a_centre_does_not_depend_on_the_points_of_stress() -> None:
     deck = impact_on(8).to_text()
     (card,) = [line for line in deck.splitlines() if line.split()[:3] == ["3", "3", "-3"]]
@@ -125,7 +124,6 @@ def test_a_tie_names_the_first_place_and_counts_the_others() -> None:
         assert one.mirrors == 1  # half a turn maps the plate onto itself
 
 
-@pytest.mark.long
 def test_corners_of_a_window_inside_the_plate_are_found() -> None:
     deck = fecm.impact(
         fecm.Plate.on_fixture("D7136"),

@@ -121,7 +121,6 @@ def test_the_place_and_the_force_of_a_run_are_found() -> None:
     assert found.accepted
 
 
-@pytest.mark.long
 def test_an_impact_on_a_curved_panel_is_found() -> None:
     deck = curved(panel("[0/90/45/45]"))
     run = fecm.run_one(deck)
@@ -317,7 +316,6 @@ def test_the_95_percent_ellipse_covers_the_place_in_95_of_100(
     assert (ratio < 1.3).all()
 
 
-@pytest.mark.long
 def test_the_ellipse_encloses_its_share_of_a_normal_distribution() -> None:
     found = noisy()
     edge = found.ellipse(0.5) - [found.x, found.y]
@@ -328,7 +326,6 @@ def test_the_ellipse_encloses_its_share_of_a_normal_distribution() -> None:
         found.ellipse(1.0)
 
 
-@pytest.mark.long
 def test_the_noise_is_that_of_the_residual_unless_it_is_given() -> None:
     strains, noise = scatter(struck_on_a_point()[1], NOISE, seed=1)
     found = located(strains)
@@ -358,7 +355,6 @@ def test_the_energy_bound_follows_from_impulse_and_mass() -> None:
     assert noisy().energy_bound is None
 
 
-@pytest.mark.long
 def test_a_force_that_has_not_ended_is_said_to_be_open() -> None:
     early = TIME < 1.2e-4
     deck, strains, _ = struck_on_a_point()
@@ -416,7 +412,6 @@ def test_a_record_that_begins_before_the_impact_is_located() -> None:
     assert found.force[found.time <= 0.0].max() < 0.05 * found.peak_force
 
 
-@pytest.mark.long
 def test_a_gage_with_another_gain_is_found_out() -> None:
     strains, noise = scatter(struck_on_a_point()[1], NOISE / 4.0, seed=3)
     found = located(strains * [1.1, 1.0, 1.0], noise=noise, gains=True)
@@ -568,7 +563,6 @@ def test_a_misfit_that_noise_does_not_explain_is_said_and_widens_the_errors() ->
     assert not large.accepted
 
 
-@pytest.mark.long
 def test_strains_at_which_plies_fail_are_not_accepted() -> None:
     found = located(struck_on_a_point()[1] * (0.02 / np.abs(struck_on_a_point()[1]).max()))
     assert not found.accepted

@@ -101,7 +101,6 @@ def test_a_unit_needs_the_decks_own() -> None:
     assert "--energy is '4J': give the deck's --units" in made.stderr
 
 
-@pytest.mark.long
 def test_a_fixtures_energy_in_millijoules_is_doubted() -> None:
     doubt = "where D7136 has 6.7: --energy is in mJ unless it has a unit"
     made = new(*D7136, *QUICK, "--energy", "10")
@@ -198,7 +197,6 @@ def test_a_likely_mistake_of_an_option_is_named(options: tuple[str, ...], messag
     assert message in made.stderr
 
 
-@pytest.mark.long
 def test_sound_options_are_not_doubted() -> None:
     rubber = new(*D7136[:-2], *QUICK, "--contact", "estimate:8,20,.49")
     assert "looks like" not in rubber.stderr
@@ -287,7 +285,6 @@ def test_damage_stores_ply_stresses_on_both_sides_of_the_edge_of_the_load(mesh: 
     assert len(result["plies/time"]) == 25  # 50 steps, every second
 
 
-@pytest.mark.long
 def test_plies_says_how_often_damage_stores_ply_stresses_and_of_how_many_places() -> None:
     plain = new_deck(*STORED, "--plies", "0")
     words = [macro.word for macro in plain.macros]
@@ -352,7 +349,6 @@ def test_a_laminate_without_coupling_stays_held_everywhere() -> None:
     assert "--in-plane has no effect: the laminate is not coupled" in free.stderr
 
 
-@pytest.mark.long
 def test_a_coupled_laminate_slides_on_the_window_of_a_fixture() -> None:
     # N/mm on 20 x 12 elements, with u and v of the window's nodes restrained and freed by hand.
     for in_plane, expected in (("held", 3060.0), (None, 2199.0)):

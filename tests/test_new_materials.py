@@ -255,7 +255,6 @@ def test_physical_surfaces_of_gmsh_carry_laminates(tmp_path: Path) -> None:
     assert laminates(fecm.read_one(made.stdout)) == [1, 2, 1, 1, 2, 1]
 
 
-@pytest.mark.long
 def test_a_sweep_over_materials_of_layers_is_that_of_single_runs() -> None:
     deck = objects(fecm.Laminate("[0C/90G]s", {"C": "IM7/8552", "G": "E-glass/MY750"}, 0.25))
     swept = fecm.sweep(deck, {"layer_materials": ["[1/2]s", "[2/1]s"], "dt": [1e-7]}, history=True)
@@ -297,7 +296,6 @@ def test_the_picture_of_failure_shows_plates_of_several_laminates(tmp_path: Path
     assert (tmp_path / "r.png").stat().st_size > 10_000
 
 
-@pytest.mark.long
 def test_a_sweep_over_the_cure_of_several_materials_is_that_of_single_runs() -> None:
     deck = deck_of("--layup", "[0C/90G]s", "--material", "C=T300/914", "--material",
                    "G=E-glass/MY750", "--ply-thickness", ".25", "--cure", ":20", "--damage",
@@ -381,7 +379,6 @@ def test_summary_json_page_and_picture_name_the_metal_that_yields(tmp_path: Path
     assert "(2024-T3)" in picture
 
 
-@pytest.mark.long
 def test_the_material_of_a_ply_is_that_of_the_laminate_where_it_is() -> None:
     deck = deck_of(*GLARE[:-1], "--layup", "[0G/0G/0G]", "--zone", "10,10,30,20:[0M/0G/0M]",
                    "--damage")  # fmt: skip

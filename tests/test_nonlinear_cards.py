@@ -293,7 +293,6 @@ def test_displaced_edges_before_an_impact_are_the_preload_of_their_strain() -> N
 # Sweeps ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_a_swept_preload_is_that_of_a_deck_changed_by_hand() -> None:
     text = fecm.impact(plate(), PLIES, MASS, LAW, **QUICK).to_text()
     by_hand = fecm.read_one(text.replace("EXPE\n", "PREL\n20.,0.,-3.\nEXPE\n"))

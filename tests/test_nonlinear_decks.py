@@ -120,7 +120,6 @@ def test_modes_are_those_about_the_stretched_state() -> None:
     assert preloaded.angular_frequency[0] > 1.5 * plain.angular_frequency[0]
 
 
-@pytest.mark.long
 def test_an_impact_on_displaced_edges_is_that_on_the_preload_of_the_card() -> None:
     strain = (4e-3, -5e-4)
     A = ready(text("EIGE,,3\n")).plate.laminate.A

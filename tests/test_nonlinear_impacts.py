@@ -204,7 +204,6 @@ def test_impacts_on_circular_plates_follow_the_axisymmetric_solution(row: Row) -
     assert worst_balance(found) < 1e-6
 
 
-@pytest.mark.long
 def test_an_impact_on_a_coarse_disc_deflects_it_as_the_axisymmetric_solution() -> None:
     (row,) = [
         row

@@ -320,7 +320,6 @@ def test_gages_of_a_run_read_what_the_stored_displacements_say() -> None:
 
 
 @pytest.mark.skipif(kernels.LIBRARY is None, reason="needs the compiled kernels")
-@pytest.mark.long
 def test_kernels_store_what_numpy_does() -> None:
     deck = struck(NONL, GAGES, STRENGTHS, more="PLYS=5 FAIL=5")
     one, other = (fecm.run_one(deck, solver=solver) for solver in ("kernels", "numpy"))

@@ -314,7 +314,6 @@ def test_rectangles_under_a_patch_follow_the_spectral_solution(name: str) -> Non
 
 
 @pytest.mark.parametrize("name", ["iso_100x100x2_clamped_immovable hert 1"])
-@pytest.mark.long
 def test_an_isotropic_plate_under_a_patch_is_within_two_ten_thousandths_on_a_fine_mesh(
     name: str,
 ) -> None:
@@ -419,7 +418,6 @@ def test_a_plate_with_preload_stretches_as_the_spectral_solution(ratio: str) -> 
         assert found.energy == pytest.approx(float(row["strain_energy_above_preload_mJ"]), rel=4e-4)
 
 
-@pytest.mark.long
 def test_a_preload_by_displaced_edges_is_that_of_the_card() -> None:
     by_card = with_preload(
         rectangle(100.0, 100.0, 4, isotropic(), "ss_immovable"), 505.0, -30.0, 0.0

@@ -65,7 +65,6 @@ def test_every_case_is_a_full_run_of_the_stretched_plate(runs: list[float]) -> N
     assert fecm.run_one(LINEAR).plate_w.max() > 1.09 * fecm.run_one(DECK).plate_w.max()
 
 
-@pytest.mark.long
 def test_the_limit_of_the_linear_plate_is_none_of_a_nonlinear_one() -> None:
     linear, nonlinear = (fecm.sweep(deck, {"k": [5e4]}) for deck in (LINEAR, DECK))
     deflections = [fecm.run_one(deck).plate_w.max() for deck in (LINEAR, DECK)]
@@ -100,7 +99,6 @@ def test_a_search_takes_few_runs_and_its_velocity_gives_the_same_run_again(
             np.testing.assert_allclose(again[name][0], found[name][0], rtol=1e-9)
 
 
-@pytest.mark.long
 def test_a_search_starts_at_the_quick_models_and_lengthens_runs_that_end_too_early(
     runs: list[float],
 ) -> None:
@@ -222,7 +220,6 @@ def test_a_loaded_plate_has_no_static_curve() -> None:
     assert velocity_at(heavy, static.threshold) == pytest.approx(static.velocity, rel=1e-8)
 
 
-@pytest.mark.long
 def test_a_case_that_is_run_in_full_is_judged_as_the_run_of_its_deck() -> None:
     """Slope and strain need the rows of RODP, which the case keeps for its judge."""
     deck = problem_of(DECK).deck

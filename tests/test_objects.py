@@ -129,7 +129,6 @@ def test_a_gmsh_circle_has_the_centre_stiffness_of_the_closed_form(
     assert stiffness == pytest.approx(float(row["value"]), rel=limit)
 
 
-@pytest.mark.long
 def test_a_circle_of_straight_triangles_on_simple_supports_is_no_stiffer_than_a_circle() -> None:
     meshio = pytest.importorskip("meshio", reason="meshes are read by meshio")
     read = meshio.read(TRIANGLES)
@@ -317,7 +316,6 @@ def test_a_curved_edge_on_simple_supports_is_free_to_rotate() -> None:
     assert not held[:, 3:].any()
 
 
-@pytest.mark.long
 def test_a_group_named_after_a_support_has_it_and_the_others_are_free() -> None:
     plate = imported(HOLE)
     assert plate.supports == {"clamped": "clamped"}
@@ -387,7 +385,6 @@ def test_a_plate_whose_groups_hold_nothing_is_warned_of() -> None:
         deck_on(imported(CIRCLE))
 
 
-@pytest.mark.long
 def test_the_patch_of_an_imported_mesh_lies_at_the_impact_point() -> None:
     plate = imported(CIRCLE, {"rim": "clamped"})
     deck = deck_on(plate, at=(3.0, 4.0), patch="auto")

@@ -234,7 +234,6 @@ def test_assumed_shear_strains_take_the_half_plate_of_four_elements() -> None:
     np.testing.assert_allclose(half.force, whole.force, rtol=1e-9)
 
 
-@pytest.mark.long
 def test_the_peak_on_the_reports_free_plate_does_not_depend_on_the_mesh() -> None:
     x, y = np.meshgrid(np.linspace(0.0, 6.0, 49), np.linspace(0.0, 4.0, 33))
     times, peaks = np.linspace(0.0, 6e-5, 13), {}
@@ -253,7 +252,6 @@ def test_the_peak_on_the_reports_free_plate_does_not_depend_on_the_mesh() -> Non
     assert peaks[2, 0.0347] == pytest.approx(77.18, rel=5e-3)
 
 
-@pytest.mark.long
 def test_assumed_shear_strains_neither_lock_nor_hourglass_on_a_thin_cross_ply_plate() -> None:
     # Sun and Chen's plate, [0/90/0/90/0]s, 200 x 200 x 2.69 mm; SI units.
     ply = Ply(1580.0, 0.3, 120e9, 7.9e9, 5.5e9, 5.5e9, 5.5e9)

@@ -64,7 +64,6 @@ def test_thickness_shows_six_components_with_jumps_at_the_faces_of_plies(plies: 
 
 
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
-@pytest.mark.long
 def test_a_thin_line_has_the_residual_stresses_of_the_cure(plies: Result) -> None:
     text = plies.deck_text.replace("UNIT", "CURE\n-100.,\n,1.E-6,2.E-5\n\nUNIT")
     cured = run(text)

@@ -123,7 +123,6 @@ def test_the_users_style_holds_where_it_differs_from_that_of_matplotlib(
     assert given.spines["top"].get_visible()
 
 
-@pytest.mark.long
 def test_a_file_is_that_of_the_command_line_whatever_the_users_style(
     result: fecm.Result, tmp_path: Path
 ) -> None:

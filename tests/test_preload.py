@@ -481,7 +481,6 @@ def test_every_solver_steps_the_preloaded_plate(solver: Solver) -> None:
     assert np.abs(expected["energy/balance_error"]).max() < 1e-5 * 3000.0
 
 
-@pytest.mark.long
 def test_a_resumed_run_has_the_exposures_at_rest_once(tmp_path: Path) -> None:
     text = re.sub(r"(?m)^LOOP(.*\n)*?NEXT\n", STORING, preloaded("500."))
     whole, resumed = tmp_path / "whole.h5", tmp_path / "resumed.h5"
@@ -597,7 +596,6 @@ def test_the_preload_changes_an_impact_on_few_elements_as_it_does_exactly() -> N
     assert w[1] / w[0] == pytest.approx(exact[1] / exact[0], rel=5e-3)
 
 
-@pytest.mark.long
 def test_errors_of_the_linear_plate_are_said_to_be_those_without_preload() -> None:
     said = "compressive preload increases this error"
     hard = {"velocity": [6000.0]}
@@ -627,7 +625,6 @@ def test_cases_under_a_preload_equal_their_full_runs() -> None:
         assert np.abs(force[: len(result.force)] - result.force).max() < 1e-9 * result.force.max()
 
 
-@pytest.mark.long
 def test_a_case_whose_plate_buckles_under_the_preload_says_so() -> None:
     deck = struck(4, summary_of("100g_biax_-0.5cr"), 1e-5)
     found = fecm.sweep(deck, {"thickness": [2.69, 2.0], "dt": ["auto"]})

@@ -187,7 +187,6 @@ def infinite_plate(m: float, v: float, k: float, slope: float, times: Floats) ->
     return np.asarray(k * np.maximum(solution.y[0], 0.0) ** 1.5)
 
 
-@pytest.mark.long
 def test_a_rigid_mass_on_a_large_thin_plate_is_the_impact_on_an_infinite_one() -> None:
     m, v, k = 2.0e-4, 100.0, 5.0e4
     E, nu, rho, h, shear = 1.0e7, 0.3, 2.5e-4, 0.1, 5.0e7

@@ -429,7 +429,6 @@ def test_a_tree_of_arrays_has_named_dimensions_and_places_of_the_nodes() -> None
     assert tree["history"].force.attrs["units"] == "lbf"
 
 
-@pytest.mark.long
 def test_pint_converts_a_stored_history_to_newtons(tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("pint_xarray")

@@ -99,7 +99,6 @@ def test_a_check_goes_to_another_process_and_back() -> None:
 # Comparisons -------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_a_comparison_in_python_says_what_the_command_prints(runs: Path) -> None:
     a, b = runs / "report.h5", runs / "listing.h5"
     found = fecm.diff(a, b)
@@ -129,7 +128,6 @@ def test_results_in_memory_compare_as_their_files(tmp_path: Path, runs: Path) ->
     assert in_memory.datasets == of_files.datasets
 
 
-@pytest.mark.long
 def test_sweeps_compare_in_memory_too(tmp_path: Path) -> None:
     sweep = fecm.sweep(small(), {"velocity": [50.0, 60.0]})
     sweep.save(tmp_path / "sweep.h5")
@@ -146,7 +144,6 @@ def test_sweeps_compare_in_memory_too(tmp_path: Path) -> None:
         fecm.diff(fecm.run_one(small()), sweep)
 
 
-@pytest.mark.long
 def test_tolerances_of_their_own_hold_in_the_order_of_the_mapping(runs: Path) -> None:
     a, b = runs / "report.h5", runs / "listing.h5"
     names = ["history/force", "history/velocity"]
@@ -282,7 +279,6 @@ fecm.sweep(deck, {{"layup": ["[0]", "[90]"]}}, workers=2, output="sweep.h5")
 """
 
 
-@pytest.mark.long
 def test_a_script_without_the_main_guard_is_told_so_and_leaves_no_result(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(UNGUARDED.format(deck=small()))

@@ -141,7 +141,6 @@ def test_a_reduced_plate_gives_what_the_whole_one_does(mesh: str, data: str) -> 
         assert np.abs(fast.tape3.displacement[:, :, :2]).max() > 1e-9
 
 
-@pytest.mark.long
 def test_the_long_deck_agrees_with_the_sparse_matrix_in_every_dataset() -> None:
     deck = LONG.read_text().replace("LOOP       4000", "LOOP       1000")
     assert worst(*both(deck)) < 1e-10

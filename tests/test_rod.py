@@ -176,7 +176,6 @@ def columns(text: str) -> dict[str, Floats]:
     return dict(zip(head.split(","), values.T, strict=True))
 
 
-@pytest.mark.long
 def test_the_command_prints_what_the_rod_does() -> None:
     done = call("rod", *SHAPE, *PUSH, "--station", 0.5, "--station", 0.25)
     assert done.exit_code == 0
@@ -376,7 +375,6 @@ def test_the_picture_of_a_pulse_shows_its_forces_and_accelerations() -> None:
     np.testing.assert_allclose(force, history.forces[:, 0])
 
 
-@pytest.mark.long
 def test_units_of_a_rod_without_a_deck_are_on_its_picture_and_refused_beside_a_deck(
     tmp_path: Path,
 ) -> None:

@@ -480,7 +480,6 @@ def test_half_of_the_plate_is_computed_only_where_zones_are_symmetric(
 
 
 @compiled
-@pytest.mark.long
 def test_kernels_and_numpy_agree_on_a_nonlinear_plate_of_several_laminates() -> None:
     deck = unlike(model.Nonlinear(), words="DISP=10", steps=200)
     found, wanted = (fecm.run_one(deck, solver=s) for s in ("kernels", "numpy"))
@@ -567,7 +566,6 @@ def test_an_interface_of_unlike_materials_can_delaminate() -> None:
     assert laminate(HYBRID[0], [0.0, 0.0, 180.0, 90.0], [1.0] * 4).unlike_interfaces == 1
 
 
-@pytest.mark.long
 def test_a_run_of_several_laminates_that_is_stopped_goes_on_to_the_same_bytes(
     tmp_path: Path,
 ) -> None:

@@ -36,7 +36,6 @@ def test_the_examples_of_a_module_print_what_they_say(name: str) -> None:
 # Estimates ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_an_estimate_is_what_the_command_prints(tmp_path: Path) -> None:
     path = tmp_path / "d.inp"
     path.write_text(deck("DELA\n.5,\n", mesh=HELD))

@@ -115,7 +115,6 @@ def test_no_case_depends_on_the_others_of_its_plate() -> None:
         np.testing.assert_array_equal(many[name][some], values)
 
 
-@pytest.mark.long
 def test_the_law_of_many_cases_is_the_law_of_each() -> None:
     random = np.random.default_rng(11)
     measured = [
@@ -147,7 +146,6 @@ def test_the_law_of_many_cases_is_the_law_of_each() -> None:
 # Against full runs -------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_cases_on_the_reports_plate_equal_their_full_runs() -> None:
     cases: list[Case] = [
         {"velocity": 50.0, "k": 1.0e6, "rod_mass": 1.8e-4, "s_p": 0.094, "q": 2.0},
@@ -424,7 +422,6 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
     assert_same(found, serial())
 
 
-@pytest.mark.long
 def test_a_scheduler_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr(execute, "PATIENCE", 0.5)
@@ -496,7 +493,6 @@ main()
 
 
 @pytest.mark.posix
-@pytest.mark.long
 def test_a_sweep_that_is_interrupted_from_outside_ends_in_the_same_file(tmp_path: Path) -> None:
     (tmp_path / "plate.inp").write_text(small())
     varied = ("--vary", "k=1e6,2e6", "--vary", "layup=" + ",".join(LAYUPS[:3]))

@@ -91,7 +91,6 @@ def test_a_case_has_the_same_bytes_with_any_others() -> None:
 
 
 @compiled
-@pytest.mark.long
 def test_errors_of_the_energy_balance_are_those_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of cases that lose energy, some whose motion is not finite."""
     seen: list[responses.ComputedImpacts] = []

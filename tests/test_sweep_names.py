@@ -192,7 +192,6 @@ def test_places_that_can_not_be_hit_are_cases_with_a_reason() -> None:
 # Time step and duration --------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_dt_auto_is_dt_0_of_the_deck_of_the_case() -> None:
     deck = new(dt="2e-7")
     found = fecm.sweep(deck, {"dt": ["auto", 2e-7], "thickness": [2.0, 8.0]})
@@ -287,7 +286,6 @@ def test_columns_that_a_deck_does_not_have_are_refused(names: object, message: s
         fecm.sweep(small(), {"k": [1e6]}, measure=names)  # type: ignore[arg-type]
 
 
-@pytest.mark.long
 def test_the_command_measures_and_counts_what_failed(tmp_path: Path) -> None:
     deck, path = tmp_path / "p.inp", tmp_path / "s.h5"
     deck.write_text(gaged().to_text())

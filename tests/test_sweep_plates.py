@@ -88,7 +88,6 @@ def test_u_and_v_are_free_where_b_is_not_zero_and_w_is_free() -> None:
     assert kept.all(Boundary) == deck.all(Boundary)
 
 
-@pytest.mark.long
 def test_a_note_counts_the_cases_whose_u_and_v_are_set_free(tmp_path: Path) -> None:
     deck = tmp_path / "plate.inp"
     deck.write_text(new("[0/90]s"))
@@ -113,7 +112,6 @@ def test_supports_in_the_plane_that_hold_some_nodes_only_are_kept() -> None:
     assert made.all(Boundary) == deck.all(Boundary)
 
 
-@pytest.mark.long
 def test_in_plane_unknowns_that_rest_do_not_limit_the_time_step() -> None:
     # Stiff plies at the faces: the plate is faster in its plane than in bending.
     held = model(LONG.read_text().replace("LOOP       4000", "LOOP       1000"))

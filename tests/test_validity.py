@@ -37,7 +37,6 @@ def numbers(line: str) -> list[float]:
     return [float(text) for text in re.findall(r"-?\d+\.?\d*(?:e[-+]\d+)?", line)]
 
 
-@pytest.mark.long
 def test_a_held_plate_is_warned_of_beyond_half_its_thickness(tmp_path: Path) -> None:
     impact = small(LONG, mesh=HELD)
     slow, result = notes(tmp_path, impact)

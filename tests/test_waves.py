@@ -311,7 +311,6 @@ def test_derivatives_are_those_of_the_velocities(general: WaveSurfaces) -> None:
     np.testing.assert_allclose(here.curvature / size, curvature / size, rtol=1e-5, atol=1e-5)
 
 
-@pytest.mark.long
 def test_where_sheets_cross_or_touch_the_names_stay_on_smooth_curves() -> None:
     cross_ply = laminate(REPORT_PLY, [0.0, 90.0], [0.05, 0.05])
     one_ply = laminate(REPORT_PLY, [0.0], [0.1])

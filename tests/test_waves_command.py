@@ -164,14 +164,12 @@ def test_the_shear_factor_multiplies_the_transverse_shear_stiffness() -> None:
         assert other["bending"] == one["bending"]
 
 
-@pytest.mark.long
 def test_fronts_start_from_a_circle_of_the_given_radius() -> None:
     for option, radius in (((), 0.106), (("--radius", "2"), 2.0), (("--radius", "0"), 0.0)):
         for row in rows(call("waves", "fronts", LONG, "--step", "45", "--time", "0", *option)):
             assert np.hypot(float(row["x"]), float(row["y"])) == pytest.approx(radius, abs=1e-15)
 
 
-@pytest.mark.long
 def test_normals_run_from_0_to_360_as_far_as_the_step_goes() -> None:
     for step, expected in (("90", [0, 90, 180, 270, 360]), ("100", [0, 100, 200, 300])):
         found = [
@@ -183,7 +181,6 @@ def test_normals_run_from_0_to_360_as_far_as_the_step_goes() -> None:
     assert float(tenths[-1]["angle_deg"]) == 360.0
 
 
-@pytest.mark.long
 def test_cusps_are_reported_on_standard_error_alone() -> None:
     done = call("waves", "fronts", LONG, "--time", "0", "5e-6")
     notes = done.stderr.splitlines()
