@@ -13,7 +13,7 @@ import fecm
 plate = fecm.Plate.rectangle((80, 60), (8, 6), support="simple")
 laminate = fecm.Laminate("[45/-45]4s", "AS4/8552")
 ball, steel = fecm.RigidMass(2e-5), fecm.Contact.estimate(radius=8)  # t, mm
-deck = fecm.impact(plate, laminate, ball, steel, energy=40, duration=1e-3)  # mJ, s
+deck = fecm.impact(plate, laminate, ball, steel, energy="40mJ", duration=1e-3)
 tried = []
 
 

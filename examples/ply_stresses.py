@@ -13,7 +13,7 @@ import fecm
 plate = fecm.Plate.rectangle((120, 80), (30, 20), support="simple")
 laminate = fecm.Laminate("[45/0/-45/90]2s", "AS4/8552")
 ball, steel = fecm.RigidMass(2e-5), fecm.Contact.estimate(radius=8)  # t, mm
-impact = {"energy": 40, "duration": 1e-3, "patch": "disc:4", "plies": (50, 150)}
+impact = {"energy": "40mJ", "duration": 1e-3, "patch": "disc:4", "plies": (50, 150)}
 result = fecm.run_one(fecm.impact(plate, laminate, ball, steel, **impact))
 plies = result.plies()
 away = ~plies.under_load  # plate theory does not hold under the load

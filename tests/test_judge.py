@@ -411,7 +411,7 @@ def test_an_estimate_tells_the_deflection_at_the_threshold(tmp_path: Path) -> No
     (tmp_path / "d.inp").write_text(soft(3e-3).with_(velocity=200).to_text())
     done = call("estimate", "d.inp", cwd=tmp_path)
     assert done.exit_code == 0
-    (line,) = [line for line in done.stderr.splitlines() if "the run at the threshold" in line]
+    (line,) = [line for line in done.stderr.splitlines() if "at the threshold deflects" in line]
     assert 2.0 < float(line.partition("deflects by ")[2].split()[0]) < 4.0
     (own,) = [line for line in done.stdout.splitlines() if line.lstrip().startswith("run ")]
     assert own.split()[1:3] == ["open", "open"]

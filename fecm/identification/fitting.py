@@ -243,7 +243,11 @@ def covariance(points: FittedPoints) -> Floats:
     matrix: Floats = points.variance / peak**2 * root @ root.T
     errors = zip(names, np.sqrt(np.diagonal(matrix)), strict=True)
     # Delay and offset may be 0: they have no relative error.
-    vague = [f"{n} ({100.0 * e:.0f} %)" for n, e in errors if e > 1.0 and n not in OF_RECORD]
+    vague = [
+        f"{name} ({'over 1000' if error > 10.0 else f'{100.0 * error:.0f}'} %)"
+        for name, error in errors
+        if error > 1.0 and name not in OF_RECORD
+    ]
     if vague:
         hint = (
             "the standard error is above 100 %; set known values in the deck, and do not fit them"

@@ -158,7 +158,7 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
     calls this function whenever it is imported can't have workers.
     """
     remaining = {task.number: task for task in tasks}
-    deaths = 0
+    deaths, is_guarded = 0, False  # once a worker has started, the script is guarded
     start_resource_tracker()
     while remaining and deaths < DEATHS:
         before = len(remaining)
@@ -172,7 +172,8 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
         except SchedulerError:  # Python starts no process while it imports the script
             raise SchedulerError(UNGUARDED) from None
         except futures.BrokenExecutor:
-            if not started.is_set():
+            is_guarded = is_guarded or started.is_set()
+            if not is_guarded:
                 raise SchedulerError(UNGUARDED) from None
             deaths = 0 if len(remaining) < before else deaths + 1
         finally:

@@ -60,7 +60,7 @@ BREAKS: Breaks = {
     ),
     "permanent indentation from the first touch on": (
         instead(LinearPermanent, "permanent", lambda right, law, peak: law.s_p * peak),
-        {"permanent-indentation": ("largest value",), "indentation": ("F at α₀",)},
+        {"permanent-indentation": ("largest value",)},
     ),
     "permanent indentation of ACR halved": (
         in_numpy(changed(YangSunPermanent, "permanent", halved)),
