@@ -47,8 +47,9 @@ from fecm.studies.indentation_test.study import fit_law
 from fecm.studies.indentation_test.turns import read_test
 
 PARAMETERS = ("acr", "columns", "units")  # of fits, which messages name
-# Largest indentation over the critical one, where --permanent ends by default: of 3-8, and of 3-7.
-REACH = (6.0, 2.0)
+# Largest indentation over the critical one, where --permanent ends by default.
+REACH = 6.0
+REACH_ACR = 2.0  # of equation 3-7, whose critical indentation is larger
 Row = tuple[object, ...]  # of a table; the first value is the name of the law
 RATE = (
     "The report loaded at about 10 lb/s. k hardly depended on the rate from 5 to 50 lb/s, and fell "
@@ -303,8 +304,8 @@ def _peaks(options: CurveOptions, name: str, default: float) -> Floats:
 def _permanents(options: CurveOptions) -> None:
     """Write largest and permanent indentations by 3-8, or 3-7 (figure 3.6)."""
     cards, units = options.laws()
-    critical = max(REACH[bool(card.word)] * card.alpha_p for card in cards.values())
-    peaks = _peaks(options, "permanent", critical)
+    reach = max((REACH_ACR if law.word else REACH) * law.alpha_p for law in cards.values())
+    peaks = _peaks(options, "permanent", reach)
     curves = {
         name: np.array([peaks, build_constants(card).permanent(peaks)])
         for name, card in cards.items()
