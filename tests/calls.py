@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 import io
 import subprocess
 import sys
@@ -94,3 +95,11 @@ def new_deck(*options: str | Path) -> Deck:
     made = new(*options)
     assert made.exit_code == 0, made.stderr
     return fecm.read_one(made.stdout)
+
+
+def rows(done: Done) -> list[dict[str, str]]:
+    """The table that a call has printed, by names without units."""
+    assert done.exit_code == 0, done.stderr
+    head, *lines = csv.reader(io.StringIO(done.stdout))
+    names = [name.partition(" (")[0] for name in head]
+    return [dict(zip(names, line, strict=True)) for line in lines]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,7 @@ import pytest
 
 import fecm
 from fecm.studies import Fronts
-from tests.calls import Done, assert_unusable, call
+from tests.calls import assert_unusable, call, rows
 from tests.decks import DATA_CARDS, LONG, PROGRAM, small
 
 Rows = list[dict[str, str]]
@@ -26,14 +24,6 @@ K = {
     "report-0.75b": 1.990e6,
 }
 ALPHA_P, S_P, ALPHA_CR = 6.564e-4, 0.094, 3.16e-3
-
-
-def rows(done: Done) -> Rows:
-    """The table that a call has printed, by names without units."""
-    assert done.exit_code == 0, done.stderr
-    head, *lines = csv.reader(io.StringIO(done.stdout))
-    names = [name.partition(" (")[0] for name in head]
-    return [dict(zip(names, line, strict=True)) for line in lines]
 
 
 def numbers(table: Rows, name: str, **chosen: str) -> Any:

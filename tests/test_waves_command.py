@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +12,12 @@ import fecm
 from fecm.plot import PlotError
 from fecm.studies import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from tests.builders import general_plate, report_plate, table
-from tests.calls import Done, assert_unusable, call
+from tests.calls import assert_unusable, call, rows
 from tests.decks import DATA_CARDS, LONG, small
 
 LAYUP = ("--layup", "[0/45/0/-45/0]2s", "--ply-thickness", ".0053")
 LAMINATE = (*LAYUP, "--material", "report")
 UNSYMMETRIC = ("--layup", "0/30/70", "--ply-thickness", ".1", "--material", "report")
-
-
-def rows(done: Done) -> list[dict[str, str]]:
-    """The table that a call has printed, by names without units."""
-    assert done.exit_code == 0, done.stderr
-    head, *lines = csv.reader(io.StringIO(done.stdout))
-    names = [name.partition(" (")[0] for name in head]
-    return [dict(zip(names, line, strict=True)) for line in lines]
 
 
 # Tables -----------------------------------------------------------------------------------------

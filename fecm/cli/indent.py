@@ -192,7 +192,7 @@ class CurveOptions:
         return {name: CONTACTS[name].converted(system) for name in names}, units_of(system)
 
     def write(self, columns: dict[str, str], units: dict[str, str], rows: Iterable[Row]) -> None:
-        """Write the rows of a table; those of named laws begin with the name."""
+        """Write the rows of a table. The rows of named laws begin with the name."""
         named = {"contact": "", **columns} if self.contacts else columns
         skipped = 0 if self.contacts else 1
         self.targets.write(named, units, (row[skipped:] for row in rows))

@@ -94,7 +94,7 @@ class LocationJob(LocationOptions):
     >>> location = job.execute()  # doctest: +SKIP
     """
 
-    deck: AnyDeck
+    deck: AnyDeck | Problem
     strains: StrainSource
 
     def __post_init__(self) -> None:
@@ -168,7 +168,7 @@ class LocationJob(LocationOptions):
                 raise StoppedError("stopped; no place is known yet")
 
         advance()
-        fit, region, times = prepared(problem, table, self, shift=self.shift)
+        fit, region = prepared(problem, table, self, self._times)
         advance()
         minima = best_fits(fit, region, self.grid)
         searched = Searched(fit, minima.best, region)
@@ -179,7 +179,7 @@ class LocationJob(LocationOptions):
         else:
             wide = is_wide(fit, minima.best, self.noise)
         advance()
-        location = _location(problem, table, self, (fit, times), minima)
+        location = _location(problem, table, self, (fit, self._times), minima)
         cause = _find_cause(problem, table, self, searched) if is_doubtful(location) else None
         watch.advance(PARTS, PARTS)
         return judged(location, region, wide, cause)
@@ -249,7 +249,8 @@ def _find_cause(
     if options.shift or (cause is not None and cause.ratio > CERTAIN):
         return cause
     try:
-        late_fit, *_ = prepared(problem, table, options, shift=True)
+        times = timing(table, options.basis, shift=True)
+        late_fit, _ = prepared(problem, table, options, times)
         shifted = best_fits(late_fit, region, options.grid).best
     except FecmError:  # the record is too short for a shift
         return cause

@@ -216,6 +216,7 @@ class Timing(NamedTuple):
     width: int  # of the hats of the force
     length: int  # of the record
     samples: int
+    shift: bool  # whether the time at which the force may begin is fitted
 
 
 def timing(table: StrainTable, basis: float | None, *, shift: bool) -> Timing:
@@ -251,7 +252,7 @@ def timing(table: StrainTable, basis: float | None, *, shift: bool) -> Timing:
             f"{name}: a force of {hats} values does not follow from {table.strains.size} strains; "
             "take a larger basis"
         )
-    return Timing(origin, interval, unit, parts * unit, length, length + 3)
+    return Timing(origin, interval, unit, parts * unit, length, length + 3, shift)
 
 
 def _interval(time: Floats, basis: float) -> float:
@@ -266,10 +267,9 @@ def _interval(time: Floats, basis: float) -> float:
 
 
 def prepared(
-    problem: Problem, table: StrainTable, options: LocationOptions, *, shift: bool
-) -> tuple[LocationFit, Region, Timing]:
-    """Return the fit of the strains, the region of the search, and the times of the fit."""
-    times = timing(table, options.basis, shift=shift)
+    problem: Problem, table: StrainTable, options: LocationOptions, times: Timing
+) -> tuple[LocationFit, Region]:
+    """Return the fit of the strains, and the region of the search."""
     footprint = _footprint(problem)
     region = Region.of(problem.mesh, footprint.radius, options.region)
     samples = times.interval, times.unit, times.samples
@@ -281,7 +281,7 @@ def prepared(
         footprint, observation, nodes, strains, times.unit, times.width, times.length
     )
     side = float(np.median(longest_sides(problem.mesh.elements, problem.mesh.coordinates)))
-    return LocationFit(model, side, shift, options.gains), region, times
+    return LocationFit(model, side, times.shift, options.gains), region
 
 
 def _footprint(problem: Problem) -> Footprint:
