@@ -97,7 +97,7 @@ def identify_command(
         check_page(page, overwrite, [deck, measured])
     problem = load_single(deck, "identify")
     job = IdentificationJob(
-        problem, measured, free, **options, columns=columns or (), units=units or ()
+        problem.deck, measured, free, **options, columns=columns or (), units=units or ()
     )
     watch = TerminalWatch(lambda forces: None)
     with every_minute(lambda minutes: f"fecm: {watch.done} trial forces after {minutes} min"):

@@ -129,7 +129,7 @@ class IdentificationJob:
     >>> fit = job.execute()  # doctest: +SKIP
     """
 
-    deck: AnyDeck | Problem
+    deck: AnyDeck
     measured: Source
     free: str | Sequence[str]
     filter: str | Filter | None = option(

@@ -94,7 +94,7 @@ class LocationJob(LocationOptions):
     >>> location = job.execute()  # doctest: +SKIP
     """
 
-    deck: AnyDeck | Problem
+    deck: AnyDeck
     strains: StrainSource
 
     def __post_init__(self) -> None:

@@ -556,12 +556,12 @@ class Sweep:
         return html_table(Table(tuple(rows), title=repr(self)[1:-1]))
 
 
-def checked_problem(deck: AnyDeck | Problem) -> Problem:
-    """Return the checked problem of a deck; a problem is checked already.
+def checked_problem(deck: AnyDeck) -> Problem:
+    """Return the checked problem of a deck.
 
     Raises DeckError if the deck has errors, CasesError if it has several problems.
     """
-    return deck if isinstance(deck, Problem) else _loaded(deck).problems[0]
+    return _loaded(deck).problems[0]
 
 
 def _loaded(deck: AnyDeck) -> LoadedDeck:
