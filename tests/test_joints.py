@@ -174,3 +174,9 @@ def test_a_poissons_ratio_that_no_ply_has_is_refused_in_a_file_of_plies(tmp_path
 def test_a_decimal_comma_on_prel_is_an_error(card: str, found: bool) -> None:
     deck = small(data=f"PREL\n{card}\n{DATA_CARDS}")
     assert ("E535" in [one.code for one in fecm.check(deck).findings]) is found
+
+
+def test_a_last_node_in_no_element_at_the_place_of_another_is_an_error_of_its_own() -> None:
+    mesh = MESH.replace("\n\nELEM", "\n   26    0       0.0       0.0\n\nELEM", 1)
+    deck = small(mesh=mesh).replace("   25    4    2", "   26    4    2", 1)
+    assert "Node 26 is in no element." in [f.message for f in fecm.check(deck).findings]

@@ -331,3 +331,83 @@ def test_parametric_nodes_of_gmsh_are_named(tmp_path: Path) -> None:
     )
     with pytest.raises(fecm.MeshError, match=r":4: .*SaveParametric"):
         fecm.Plate.from_mesh(file, "simple")
+
+
+ROWS = {
+    "nodes": "*NODE\n1, 0., 0.\n2, 10., 0.\n3, 20., 0.\n4, 0., 10.\n5, 10., 10.\n6, 20., 10.\n"
+    "7, 0., 20.\n8, 10., 20.\n9, 20., 20.\n",
+    "first": "1, 1, 2, 5, 4\n2, 2, 3, 6, 5\n3, 4, 5, 8, 7\n",
+    "second": "4, 5, 6, 9, 8\n",
+}
+FIRST, SECOND = (f"*ELEMENT, TYPE=S4R\n{ROWS[name]}" for name in ("first", "second"))
+
+
+@pytest.mark.parametrize(
+    ("text", "groups", "surfaces"),
+    [
+        (FIRST + "*ELSET, ELSET=Z\n1, 2\n" + SECOND, {}, {"Z": [0, 1]}),
+        ("*ELSET, ELSET=Z\n1, 4\n" + FIRST + SECOND, {}, {"Z": [0, 3]}),
+        (FIRST + SECOND.replace("S4R", "S4R, ELSET=Z"), {}, {"Z": [3]}),
+        (FIRST + SECOND.replace("S4R", "S4R,\nELSET=Z"), {}, {"Z": [3]}),
+        (
+            FIRST.replace("S4R", "s4r, elset=Z") + SECOND.replace("S4R", "S4R, ELSET=z"),
+            {},
+            {"Z": [0, 1, 2, 3]},
+        ),
+        (
+            FIRST.replace("S4R", "S4R, ELSET=A") + SECOND + "*ELSET, ELSET=Z\na, 4\n",
+            {},
+            {"A": [0, 1, 2], "Z": [0, 1, 2, 3]},
+        ),
+        ("*NSET, NSET=left\n1, 4\n" + FIRST + SECOND, {"left": [0, 3]}, {}),
+        (
+            FIRST + SECOND + "*NSET, NSET=a\n1, 4\n*NSET, NSET=b\na\n7\n",
+            {"a": [0, 3], "b": [0, 3, 6]},
+            {},
+        ),
+        (FIRST + SECOND + "*NSET, NSET=a\n1\n*NSET, NSET=a\n4\n", {"a": [0, 3]}, {}),
+        (
+            FIRST + SECOND + "*NSET, NSET=a, GENERATE\n1, 2000000000, 3\n",
+            {"a": [0, 3, 6]},
+            {},
+        ),
+        (
+            FIRST + SECOND + "*NSET, NSET=a\n1\n*NSET, NSET=a, INSTANCE=I\n4\n",
+            {"a": [3]},
+            {},
+        ),
+    ],
+    ids=range(11),
+)
+def test_sets_of_abaqus_have_their_members_wherever_they_stand(
+    tmp_path: Path, text: str, groups: dict[str, list[int]], surfaces: dict[str, list[int]]
+) -> None:
+    pytest.importorskip("meshio", reason="meshes are read by meshio")
+    mesh = read(tmp_path, ROWS["nodes"] + text, "plate.inp")
+    assert {name: rows.tolist() for name, rows in mesh.groups.items()} == groups
+    assert {name: rows.tolist() for name, rows in mesh.surfaces.items()} == surfaces
+
+
+@pytest.mark.parametrize(
+    ("cards", "message"),
+    [
+        ("*ELSET, ELSET=Z\n1, 99\n", r":17: \*ELSET has the element 99, which is not in the file"),
+        ("*NSET, NSET=Z\n99\n", r":17: \*NSET has the node 99, which is not in the file"),
+        ("*NSET, NSET=Z\nY\n", r":17: \*NSET has the set Y, which no card before it gives"),
+    ],
+)
+def test_a_set_of_abaqus_without_its_members_is_refused(
+    tmp_path: Path, cards: str, message: str
+) -> None:
+    pytest.importorskip("meshio", reason="meshes are read by meshio")
+    with pytest.raises(fecm.MeshError, match=message):
+        read(tmp_path, ROWS["nodes"] + FIRST + SECOND + cards, "plate.inp")
+
+
+@pytest.mark.parametrize("height", [0.0, 8.0])
+def test_a_last_node_in_no_element_at_the_place_of_another_is_left_out(
+    tmp_path: Path, height: float
+) -> None:
+    card = "CQUAD4,1,1,1,2,3,4"
+    mesh = read(tmp_path, bulk(*corners(), f"GRID,99,,0.,0.,{height}", card))
+    assert (mesh.nodes, mesh.elements) == (4, 1)

@@ -89,7 +89,8 @@ def merged(sides: ElementSides, pairs: Indices) -> ElementSides:
     """Merge nodes in the same place into one node."""
     if not len(pairs):
         return sides
-    rows = representatives(int(sides.nodes.max()) + 1, pairs)
+    last = max(int(sides.nodes.max()), int(pairs.max()))  # a node of no side may be the last
+    rows = representatives(last + 1, pairs)
     rows = np.append(rows, -1)  # for absent nodes
     return ElementSides(rows[sides.ends], rows[sides.between], sides.elements)
 

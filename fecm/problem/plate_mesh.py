@@ -32,6 +32,13 @@ from fecm.mechanics.joints import (
     representatives,
     sides_of_cells,
 )
+from fecm.problem.abaqus_sets import (
+    AbaqusSetError,
+    abaqus_cards,
+    element_sets,
+    node_sets,
+    nodes_and_elements,
+)
 from fecm.problem.mesh_readers import NastranError, physical_groups, read_nastran
 
 Integers = NDArray[np.int_]
@@ -238,11 +245,24 @@ def read_mesh(path: str | Path) -> PlateMesh:
     printed = io.StringIO()
     try:
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
-            read = meshio.read(path)
+            read = _read_abaqus(text) if path.suffix.lower() == ".inp" else meshio.read(path)
+    except AbaqusSetError as error:
+        raise MeshError(f"{path}:{error}") from None
     except (Exception, SystemExit) as error:
         raise MeshError(_why_unreadable(path, text, error, printed.getvalue())) from None
     _add_groups(read, physical_groups(text))
     return from_meshio(read, f"{path}: ")
+
+
+def _read_abaqus(text: bytes) -> MeshLike:
+    """Read an input of Abaqus: nodes and elements by meshio, sets by :mod:`abaqus_sets`."""
+    import meshio
+
+    cards = list(abaqus_cards(text.decode(errors="replace")))
+    read: MeshLike = meshio.read(io.StringIO(nodes_and_elements(cards)), file_format="abaqus")
+    read.point_sets = node_sets(cards)
+    read.cell_sets = element_sets(cards, [block.data.shape[1] for block in read.cells])
+    return read
 
 
 def _add_groups(read: MeshLike, groups: Mapping[tuple[int, int], list[int]]) -> None:
@@ -295,7 +315,7 @@ def _check_abaqus(path: Path, text: bytes) -> None:
 def _why_unreadable(path: Path, text: bytes, error: BaseException, printed: str) -> str:
     """Say what meshio can't read, where it is, and what helps."""
     why = " ".join(str(error).split()) if isinstance(error, Exception) else ""
-    if match := re.search(r"Element type not available: (\S+)", printed):
+    if match := re.search(r"Element type not available: (\S+)", f"{printed} {why}"):
         kind = match[1]
         lines = _lines_with(text, rb"\*element\b.*type\s*=\s*" + re.escape(kind).encode() + rb"\b")
         instead = f"; write it as {ALIKE[kind]}" if kind in ALIKE else ""
