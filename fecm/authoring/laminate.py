@@ -269,7 +269,7 @@ class Bound(NamedTuple):
     @property
     def nu23(self) -> float:
         """Poisson's ratio across the fibres."""
-        return self.named.nu23 if self.named else catalogue.NU23
+        return self.named.nu23 if self.named else catalogue.nu23_of(self.ply, None)
 
 
 class DeckPlies(NamedTuple):

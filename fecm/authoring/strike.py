@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 from fecm.authoring.case import NO_THRESHOLD, CasesError, Value, raise_first
 from fecm.authoring.plates import swapped
 from fecm.deck import model
-from fecm.deck.catalogue import NU23, STANDARD, STEEL_MODULUS, STEEL_POISSON
+from fecm.deck.catalogue import STANDARD, STEEL_MODULUS, STEEL_POISSON, nu23_of, system_of
 from fecm.deck.findings import Findings
 from fecm.deck.macros import compile_program
 from fecm.deck.units import MODULUS, in_si, unit_names, units_of
@@ -152,7 +152,7 @@ def set_radius(strike: Strike, value: Value) -> Strike:
     layers = struck_layers(strike.plate)
     plies = tuple(strike.plate.plies[layer.material] for layer in layers)
     try:
-        modulus = _indentation_modulus(layers, plies)
+        modulus = _indentation_modulus(layers, plies, system_of(strike.plate))
         k = hertz_coefficient(float(value), steel, STEEL_POISSON, modulus)
     except ValueError as error:
         raise CasesError(f"k cannot be estimated: {error}") from None
@@ -169,10 +169,13 @@ def struck_layers(deck: model.Deck) -> tuple[model.Layer, ...]:
 
 
 @lru_cache(maxsize=256)
-def _indentation_modulus(layers: tuple[model.Layer, ...], plies: tuple[model.Ply, ...]) -> float:
+def _indentation_modulus(
+    layers: tuple[model.Layer, ...], plies: tuple[model.Ply, ...], system: str | None
+) -> float:
     angles = [layer.angle for layer in layers]
     thicknesses = [layer.thickness for layer in layers]
-    return indentation_modulus(effective_stiffness(plies, angles, thicknesses, NU23))
+    ratios = [nu23_of(ply, system) for ply in plies]
+    return indentation_modulus(effective_stiffness(plies, angles, thicknesses, ratios))
 
 
 def set_toughness(strike: Strike, value: Value) -> Strike:

@@ -478,7 +478,8 @@ def hertz(sphere: SphereOptions, e_t: float, card: CardOptions, form: Format) ->
 @option(
     "--nu23",
     type=Finite(),
-    help="Poisson's ratio of the ply across the fibres.  [default: the named ply's, or 0.4]",
+    help="Poisson's ratio of the ply across the fibres.  [default: the named ply's, or "
+    "E2/(2 G23) - 1]",
 )
 @SPHERE
 @CARD
@@ -501,7 +502,9 @@ def estimate_k_command(
         raise click.UsageError("--ply-thickness is of a layup without letters here")
     constants = laminate.constants()
     if nu23 is None:
-        nu23 = laminate.named.nu23 if laminate.named else catalogue.NU23
+        nu23 = (
+            laminate.named.nu23 if laminate.named else catalogue.nu23_of(constants, laminate.units)
+        )
     stiffness = effective_stiffness(constants, layup, [thickness] * len(layup), nu23)
     modulus = indentation_modulus(stiffness)
     k, by_e2 = sphere.coefficient(modulus), sphere.coefficient(constants.e2)

@@ -9,6 +9,7 @@ from fecm.deck.card import parse_integer as parse_integer
 from fecm.deck.card import parse_real as parse_real
 from fecm.deck.catalogue import CONTACTS as CONTACTS
 from fecm.deck.catalogue import MATERIALS as MATERIALS
+from fecm.deck.catalogue import poissons_ratio_across as poissons_ratio_across
 from fecm.deck.catalogue import read_plies as read_plies
 from fecm.deck.findings import MOST as MOST
 from fecm.deck.findings import CardPlace as CardPlace

@@ -75,7 +75,42 @@ STRENGTHS = ("XT", "XC", "YT", "YC", "S12")
 SYSTEM_OF_FILES = "mm-N-s"  # system of units of a file without `units`
 # Smallest E1 of a ply in Pa, and largest density of a core in kg/m^3.
 SOFT, LIGHT = 1e9, 800.0
-NU23 = 0.4  # default of nu23
+NU23 = 0.4  # nu23 of a ply of parallel fibres whose G23 does not give one
+MOST_NU23 = 0.6  # largest nu23 that G23 may give
+ISOTROPIC = 0.05  # largest relative difference of moduli from an isotropic solid's
+
+
+def poissons_ratio_across(
+    nu12: float, e1: float, e2: float, g12: float, g23: float | None
+) -> float:
+    """Return Poisson's ratio nu23 of a ply from its other constants.
+
+    An isotropic ply has nu12. A ply of parallel fibres is isotropic across them: nu23 is E2/(2 G23)
+    - 1, to four digits. It is 0.4 if G23 is not known, or gives a value that no ply has.
+
+    Parameters
+    ----------
+    nu12 : float
+        Poisson's ratio in the plane of the ply.
+    e1, e2, g12 : float
+        Moduli in the plane of the ply, force/area.
+    g23 : float or None
+        Shear modulus across the fibres, force/area; None if it is not known.
+
+    Examples
+    --------
+    >>> poissons_ratio_across(0.3, 70e3, 70e3, 70e3 / 2.6, None)
+    0.3
+    >>> poissons_ratio_across(0.28, 181e3, 10.3e3, 7.17e3, 3.68e3)
+    0.3995
+    """
+    shear = e1 / (2.0 * (1.0 + nu12))
+    moduli = (e2, e1), (g12, shear), (g23 or shear, shear)
+    if all(abs(value / isotropic - 1.0) < ISOTROPIC for value, isotropic in moduli):
+        return nu12
+    if g23 is None or not 0.0 <= (ratio := e2 / (2.0 * g23) - 1.0) <= MOST_NU23:
+        return NU23
+    return float(f"{ratio:.4g}")
 
 
 class NamedPly(NamedTuple):
@@ -108,8 +143,11 @@ class NamedPly(NamedTuple):
 
     @property
     def nu23(self) -> float:
-        """Poisson's ratio across the fibres."""
-        return self.values.get("nu23", NU23)
+        """Poisson's ratio across the fibres; :func:`poissons_ratio_across` if it is not given."""
+        if (given := self.values.get("nu23")) is not None:
+            return given
+        nu12, e1, e2, g12 = (self.values[key] for key in ("nu12", "E1", "E2", "G12"))
+        return poissons_ratio_across(nu12, e1, e2, g12, self.values.get("G23"))
 
     def value(self, key: str, system: str) -> float | None:
         """Return a constant in a system of units; None if it is not known.
@@ -287,6 +325,16 @@ def _read_resource(file: str) -> str:
 
 
 MATERIALS = read_plies(_read_resource("materials.toml"))
+
+
+def nu23_of(ply: Ply, system: str | None) -> float:
+    """Return Poisson's ratio nu23 of the named ply with these constants, or that of the constants.
+
+    The latter is :func:`poissons_ratio_across`.
+    """
+    if (named := named_ply(ply, system)) is not None:
+        return named.nu23
+    return poissons_ratio_across(ply.nu12, ply.e1, ply.e2, ply.g12, ply.g23)
 
 
 def named_ply(ply: Ply, system: str | None) -> NamedPly | None:
