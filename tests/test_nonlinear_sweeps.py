@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,8 @@ import fecm
 from fecm.authoring import Case
 from fecm.deck import Impact
 from fecm.problem import NoCurveError, Problem, load_deck, nonlinear_curve
+from fecm.results import MemorySink
+from fecm.simulation import Simulation, run_program
 from fecm.studies import quick_estimate, velocity_at
 from fecm.sweeps import Outcome, backends, in_full, price, tasks
 from fecm.sweeps.plan import plan
@@ -140,6 +144,28 @@ def test_the_expected_time_grows_with_the_work(monkeypatch: pytest.MonkeyPatch) 
     assert expected_time([{"dt": 4e-7}, {"dt": 2e-7}]) == "20 s"
     cases = [{"refine": 1, "elements": 4, "dt": 4e-7}, {"refine": 2, "elements": 16, "dt": 2e-7}]
     assert expected_time(cases) == "56 s"
+
+
+def test_a_step_is_timed_with_the_rows_and_the_criteria_of_the_sweep(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    timed: list[Simulation] = []
+
+    def record(start: Callable[[Any], Simulation]) -> tuple[float, float]:
+        timed.append(start(lambda _: None))
+        run_program(timed[-1])
+        return 1.0, 0.01
+
+    monkeypatch.setattr(price, "seconds_of_steps", record)
+    monkeypatch.setattr(price, "time", SimpleNamespace(perf_counter=lambda: 0.0))
+    deck = DECK.replace("RODP         50\n", "RODP         50\nFAIL         50\n")
+    deck = deck.replace("DELA\n.5\n", "ALLO\n200.,120.,8.,20.,10.\n\n")
+    job = fecm.Sweep(deck, {"xt": [200.0, 210.0, 220.0]}, measure="failure")
+    assert job.price.seconds == pytest.approx(1.0 + 600 * 0.01)  # one run for three cases
+    (simulation,) = timed
+    assert len(simulation.others) == 2
+    assert isinstance(simulation.sink, MemorySink)
+    assert len(simulation.sink.arrays["tape9/step"]) == 600 // 50
 
 
 @pytest.mark.long

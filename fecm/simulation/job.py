@@ -44,7 +44,7 @@ from fecm.problem.problem import Problem
 from fecm.results.result import Result, load
 from fecm.results.sinks import MemorySink
 from fecm.simulation.run import run_program, simulate
-from fecm.simulation.simulation import Simulation
+from fecm.simulation.simulation import Observer, Simulation
 
 Solver = Literal["auto", "kernels", "numpy", "csr"]
 
@@ -408,11 +408,14 @@ class ProblemRun:
     def price(self) -> Price:
         """What the run takes. The time is estimated from the first steps."""
         problem, in_memory = self.problem, self.path is None
+        before, step = seconds_of_steps(
+            lambda observer: Simulation(problem, MemorySink(), self.options, observers=(observer,))
+        )
         return Price(
             problem.work.steps,
             problem.output_bytes,
             needed_bytes(problem, solver=self.options.solver, in_memory=in_memory),
-            _seconds(problem, self.options),
+            before + step * max(1, problem.work.steps),
         )
 
     def execute(self, watch: Watch = SILENT) -> Result:
@@ -528,9 +531,13 @@ class _EnoughError(Exception):
     """The steps so far show how long a step takes."""
 
 
-def _seconds(problem: Problem, options: RunOptions) -> float:
-    """Estimate the seconds of a run on this machine from its first steps; NaN if they fail."""
-    steps, done, took = problem.work.steps, 0, 0.0
+def seconds_of_steps(start: Callable[[Observer], Simulation]) -> tuple[float, float]:
+    """Return the seconds of a run before its steps, and of a step, on this machine.
+
+    `start` returns the simulation with an observer. Its first steps are timed; they store rows as
+    often as the whole run does. Both values are NaN if these steps fail.
+    """
+    done, took = 0, 0.0
     begin = time.perf_counter()
 
     def look(simulation: Simulation) -> None:
@@ -540,14 +547,14 @@ def _seconds(problem: Problem, options: RunOptions) -> float:
             raise _EnoughError
 
     try:
-        simulation = Simulation(problem, MemorySink(), options, observers=(look,))
+        simulation = start(look)
         first = time.perf_counter()
         with contextlib.suppress(_EnoughError):
             run_program(simulation)
-            done, took = steps, time.perf_counter() - first
+            done, took = simulation.problem.work.steps, time.perf_counter() - first
     except (FecmError, ArithmeticError):
-        return math.nan
-    return first - begin + took * max(1.0, steps / max(1, done))
+        return math.nan, math.nan
+    return first - begin, took / max(1, done)
 
 
 @with_parameters_of(Run)

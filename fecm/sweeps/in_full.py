@@ -41,11 +41,11 @@ from fecm.results.metrics import (
 )
 from fecm.results.result import Result
 from fecm.results.run_metrics import deflection_of
-from fecm.results.sinks import MemorySink
+from fecm.results.sinks import MemorySink, Sink
 from fecm.results.validity import Extent, reasons_of
 from fecm.simulation.recorder import exposures_of
 from fecm.simulation.run import run_program, simulate
-from fecm.simulation.simulation import Criteria, Simulation
+from fecm.simulation.simulation import Criteria, Observer, Simulation
 from fecm.sweeps.outcome import About, Outcome, outcome_of
 from fecm.sweeps.plan import BuildFunction, Measure, MeasureFunction, Settings
 
@@ -212,12 +212,7 @@ def in_one_motion(
         return invalid
     problems = [problem for problem, _ in built_cases.values()]
     try:
-        options = RunOptions(law=settings.law)
-        simulation = Simulation(without_output(problems[0], measures), sink, options)
-        if Measure.FAILURE in measures:
-            simulation.others = [
-                _criteria(simulation, built_problem) for built_problem in problems[1:]
-            ]
+        simulation = motion(settings, problems, sink)
         run_program(simulation)
     except (CasesError, DivergenceError, LawError, ArithmeticError) as error:
         return [*invalid, Outcome.failed(dict.fromkeys(built_cases, str(error)))]
@@ -235,6 +230,20 @@ def in_one_motion(
         outcome = _outcome(number, built_problem, measures, result, simulation.state.dt)
         outcomes.append(with_hit(outcome, built_problem, case))
     return outcomes
+
+
+def motion(
+    settings: Settings, problems: Sequence[Problem], sink: Sink, observers: Sequence[Observer] = ()
+) -> Simulation:
+    """Return the simulation of problems that differ only in values of failure.
+
+    It stores no fields unless a function measures them.
+    """
+    first = problems[0] if settings.measure else without_output(problems[0], settings.measures)
+    simulation = Simulation(first, sink, RunOptions(law=settings.law), observers=observers)
+    if Measure.FAILURE in settings.measures:
+        simulation.others = [_criteria(simulation, problem) for problem in problems[1:]]
+    return simulation
 
 
 def _criteria(simulation: Simulation, checked: Problem) -> Criteria:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from collections.abc import Sequence
@@ -9,20 +10,19 @@ from dataclasses import replace
 
 from fecm._machine import free_processors
 from fecm.authoring.case import Case, CasesError
-from fecm.authoring.timing import duration_of, lengthened
+from fecm.authoring.timing import duration_of
 from fecm.authoring.values import REFINE
 from fecm.problem.problem import Problem
 from fecm.results.metrics import SUMMARY
+from fecm.results.sinks import MemorySink
+from fecm.simulation.job import seconds_of_steps
 from fecm.sweeps.backends import run_task
-from fecm.sweeps.in_full import run_case_in_full
-from fecm.sweeps.plan import WORTH_WORKERS, Plan, Task, shares_plate, tasks
+from fecm.sweeps.in_full import motion, problem_of_case
+from fecm.sweeps.plan import WORTH_WORKERS, Plan, Settings, Task, shares_plate, tasks
 from fecm.sweeps.search import USUAL
 
 FILE = 35_000  # bytes of a file with few cases: groups, attributes, the deck
 FEW_CASES = 64  # cases that show what a case costs once its plate is stepped
-FEW = 10  # steps of a short run, which shows what a run costs before its steps
-MORE = 8  # factor on the steps of each further run
-ENOUGH = 0.1  # seconds that the last of these runs takes longer than the short run
 UNITS = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
 
 
@@ -37,12 +37,12 @@ def expected(problem: Problem, definition: Plan, workers: int | None) -> str:
     runs = "one full run each"
     if definition.settings.search is not None:
         runs = f"about {USUAL} full runs each"
-    chosen = _full_cases(problem, definition)
-    if len(chosen) < count:
-        runs = f"{len(chosen)} full run{'' if len(chosen) == 1 else 's'}"
-        count = len(chosen)
+    motions = _motions(problem, definition)
+    if len(motions) < count:
+        runs = f"{len(motions)} full run{'' if len(motions) == 1 else 's'}"
+        count = len(motions)
     text = f"a nonlinear plate has no impulse response: {cases}, {runs}"
-    _, seconds = _of_full_runs(problem, definition, chosen)
+    _, seconds = _of_full_runs(problem, definition, motions)
     if math.isnan(seconds):
         return text
     if workers is None:
@@ -63,7 +63,7 @@ def seconds_of(problem: Problem, definition: Plan) -> tuple[int, float]:
     if settings.build is not None:
         return problem.work.steps * len(definition.cases), math.nan
     if settings.modes is None and (settings.in_full or not shares_plate(problem)):
-        return _of_full_runs(problem, definition, _full_cases(problem, definition))
+        return _of_full_runs(problem, definition, _motions(problem, definition))
     whole = tasks(problem, definition)
     first = whole[0]
     alone, several = (
@@ -88,46 +88,35 @@ def output_bytes(problem: Problem, definition: Plan) -> int:
     return FILE + 8 * len(definition.cases) * (columns + steps)
 
 
-def _full_cases(problem: Problem, definition: Plan) -> Sequence[Case]:
-    """Return the cases that each take a full run: one for all that share a motion."""
+def _motions(problem: Problem, definition: Plan) -> list[Sequence[Case]]:
+    """Return the cases of each full run: those that share a motion, or one."""
     if not definition.settings.shares_motion:
-        return definition.cases
-    return tuple(task.cases[0] for task in tasks(problem, definition))
+        return [(case,) for case in definition.cases]
+    return [task.cases for task in tasks(problem, definition)]
 
 
-def _of_full_runs(problem: Problem, definition: Plan, chosen: Sequence[Case]) -> tuple[int, float]:
-    """Return steps and seconds of the full runs of cases; NaN if a run of a few steps fails."""
+def _of_full_runs(
+    problem: Problem, definition: Plan, motions: Sequence[Sequence[Case]]
+) -> tuple[int, float]:
+    """Return steps and seconds of full runs; the seconds are NaN if a run of a few steps fails."""
     each = 1 if definition.settings.search is None else USUAL
     duration = duration_of(problem)
-    steps = sum(_full_steps(case, duration, problem.work.steps) for case in chosen)
-    try:
-        begin, step = _costs(problem, definition)
-    except CasesError:
-        return int(each * steps), math.nan
-    return int(each * steps), each * (begin * len(chosen) + step * steps)
+    steps = sum(_full_steps(cases[0], duration, problem.work.steps) for cases in motions)
+    before, step = _costs(problem, definition.settings, motions[0])
+    return int(each * steps), each * (before * len(motions) + step * steps)
 
 
-def _costs(problem: Problem, definition: Plan) -> tuple[float, float]:
-    """Return the seconds of a run before its steps, and of a step."""
-    first, few = _seconds(problem, definition, FEW)
-    second, more = first, few
-    enough = FEW
-    # Other work of the machine changes short times.
-    while second - first < ENOUGH and enough < problem.work.steps:
-        enough *= MORE
-        second, more = _seconds(problem, definition, enough)
-    if more == few:
-        return 0.0, second / more
-    step = max(0.0, second - first) / (more - few)
-    return max(0.0, first - step * few), step
-
-
-def _seconds(problem: Problem, definition: Plan, steps: int) -> tuple[float, int]:
-    """Return the seconds of a run of about `steps` steps, and the number of its steps."""
-    short = lengthened(problem, min(1.0, steps / problem.work.steps))
+def _costs(problem: Problem, settings: Settings, cases: Sequence[Case]) -> tuple[float, float]:
+    """Return the seconds of the motion of cases before its steps, and of a step."""
     begin = time.perf_counter()
-    run_case_in_full(0, short, definition.settings.measures, law=definition.settings.law)
-    return time.perf_counter() - begin, short.work.steps
+    with contextlib.suppress(CasesError):  # the time until then counts, too
+        problem_of_case(settings, cases[0])
+    checking = time.perf_counter() - begin
+    problems = [problem] * len(cases)
+    before, step = seconds_of_steps(
+        lambda observer: motion(settings, problems, MemorySink(), [observer])
+    )
+    return checking * len(cases) + before, step
 
 
 def _full_steps(case: Case, duration: float, steps: int) -> float:
