@@ -2,8 +2,9 @@
 
 Tabs, semicolons, commas or blanks separate columns. A comma may be the decimal mark unless it
 separates columns. A first line such as ``sep=;`` names the separator. Blank lines and lines that
-start with # are skipped. So is the preamble that a test rig writes above the names. A unit follows
-its name in brackets, or is in the line below the names. Names are not case-sensitive.
+start with # are skipped. So is the preamble that a test rig writes above the names. Names are not
+case-sensitive. :func:`column_head` has the grammar of a name and its unit; a unit may also be in
+the line below the names.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import math
 import re
 import sys
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
@@ -58,6 +60,19 @@ UNITS = {
     "voltage": {"V": 1.0, "mV": 1e-3, "uV": 1e-6, "volt": 1.0, "volts": 1.0},
 }  # fmt: skip
 _MICRO = str.maketrans("µμε", "uue")  # both letters for micro are in use
+# Names of units in full, in small letters.
+IN_FULL = {
+    "newton": "N", "newtons": "N", "kilonewton": "kN", "kilonewtons": "kN", "pound": "lbf",
+    "pounds": "lbf", "millimeter": "mm", "millimetre": "mm", "millimeters": "mm",
+    "millimetres": "mm", "micron": "um", "microns": "um", "micrometer": "um", "micrometre": "um",
+    "micrometers": "um", "micrometres": "um", "millisecond": "ms", "milliseconds": "ms",
+    "microsecond": "us", "microseconds": "us", "sekunde": "s", "sekunden": "s",
+}  # fmt: skip
+# Units of other quantities, which end a name as the units above do.
+OTHER_UNITS = ("J", "mJ", "kJ", "Nm", "kg", "g", "t", "Pa", "kPa", "MPa", "GPa", "Hz", "kHz", "°C")
+# Words that are units, but end a name in other senses: force_in, time_min, strain_1.
+AMBIGUOUS = {"", "-", "1", "in", "min", "m", "t", "g", "strain", "mil", "ppm", "percent"}
+TAIL = 24  # longest unit with the mark before it
 # Names of columns in the tables of test rigs, by quantity; the first is fecm's own.
 WORDS = {
     "time": ("time", "zeit", "temps", "tempo", "tiempo", "t", "x_value", "x-axis"),
@@ -65,7 +80,11 @@ WORDS = {
         *("force", "load", "contact force", "impact force", "tup load", "kraft", "last"),
         *("effort", "forza", "fuerza", "carga", "f"),
     ),
-    "indentation": ("indentation", "displacement", "extension", "stroke", "depth"),
+    "indentation": (
+        *("indentation", "displacement", "extension", "stroke", "depth", "deflection"),
+        *("crosshead", "weg", "eindringung", "traverse", "traversenweg", "standardweg"),
+        *("déplacement", "spostamento", "desplazamiento"),
+    ),
 }
 DIMENSIONS = {
     "time": "time",
@@ -84,7 +103,8 @@ _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")  # a number with 
 # Numbers of a column whose marks may separate thousands: 950 and 1,060.
 _WHOLE = re.compile(r"[+-]?[0-9]{1,3}")
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:[.,' \u00a0\u2019\u202f][0-9]{3})+(?:[.,][0-9]+)?")
-_BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
+_BRACKETS = re.compile(r"[(\[]([^()\[\]]*)(?:[)\]]|$)")  # a last one may be open
+_MARKS = re.compile(r"[ _]*/[ _]*|[ _,;:-]+")  # between a name and its unit
 _SEPARATOR = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
 
 
@@ -124,8 +144,10 @@ class MeasuredTable(NamedTuple):
 
     def column(self, name: str, place: int, *, is_negated: bool = False) -> TableColumn:
         """Return the column of a number as a quantity."""
+        column = TableColumn(name, place, "", is_negated)
         unit = self.units[place] if place < len(self.units) else ""
-        return TableColumn(name, place, unit, is_negated)
+        head = self.head[1][place] if place < len(self.head[1]) else ""
+        return column._replace(unit=unit or column_head(head, column.dimension).unit)
 
     def find(
         self,
@@ -222,6 +244,8 @@ class MeasuredTable(NamedTuple):
         for n, column in enumerate(columns):
             unit, stated_unit = column.unit, stated[n] if stated else ""
             where, dimension = f"{self.path}: {column.name}", column.dimension
+            if dimension and not (unit or stated_unit):
+                self._warn_of_unread_unit(column)
             if unit and stated_unit and factor(where, unit, stated_unit, dimension) != 1.0:
                 raise StudyError(f"{where} is in {unit}, and `units` says {stated_unit}")
             if units is not None and dimension:
@@ -231,6 +255,17 @@ class MeasuredTable(NamedTuple):
             if column.is_negated:
                 numbers[n] = -numbers[n]
         return numbers
+
+    def _warn_of_unread_unit(self, column: TableColumn) -> None:
+        """Warn if the name of a column that is taken without a unit ends in what may be one."""
+        head = self.head[1][column.place] if column.place < len(self.head[1]) else ""
+        if unread := unread_unit(head):
+            example = next(iter(UNITS[column.dimension])) or "%"
+            warn(
+                f"{self.path}: {column.name} is taken without a unit; `{unread}` in `{head}` is "
+                "not read as one; if it is one, write it in brackets, as in "
+                f"`{column.name} ({example})`"
+            )
 
     def check_thousands(self, name: str, place: int) -> None:
         """Raise StudyError if commas may be decimal marks or separators of thousands.
@@ -288,10 +323,17 @@ class MeasuredTable(NamedTuple):
         row = int(rises[increasing].argmin())
         before, after = columns[increasing][row : row + 2]
         rising = [n for n in columns if n != increasing and rises[n].all()]
-        swapped = f"; are {increasing} and {rising[0]} swapped?" if rising else ""
+        remedy = f"; are {increasing} and {rising[0]} swapped?" if rising else "; sort the rows"
+        steps = np.diff(columns[increasing])
+        if (steps >= 0.0).all() and steps.any():
+            remedy = (
+                f"; {np.count_nonzero(steps == 0.0)} of {len(steps)} steps are 0: the clock is "
+                f"written with too few digits (the mean step is {steps.mean():.4g}); export it "
+                "with more, or number the rows and multiply them by the sampling interval"
+            )
         raise StudyError(
             f"{self.path}:{lines[row + 1]}: {increasing} must increase: {after:g} "
-            f"follows {before:g}{swapped}"
+            f"follows {before:g}{remedy}"
         )
 
     def _row(self, row: Row, columns: Sequence[TableColumn]) -> list[float]:
@@ -321,22 +363,29 @@ class MeasuredTable(NamedTuple):
 
 
 def plain_unit(unit: str) -> str:
-    """Return a unit with u for micro.
+    """Return the short name of a unit, with u for micro.
 
-    >>> plain_unit("µm/m")
-    'um/m'
+    >>> plain_unit("µm/m"), plain_unit("Newtons")
+    ('um/m', 'N')
     """
-    return unit.translate(_MICRO)
+    plain = unit.translate(_MICRO)
+    return IN_FULL.get(plain.casefold(), plain)
 
 
 def unit_size(source: str | Path, unit: str, dimension: str) -> float:
     """Return the size of a unit in m, N, s, V or m/m; StudyError if it is unknown."""
+    name = _unit_of(unit, dimension)
+    if name is None:
+        listing = ", ".join(filter(None, UNITS[dimension]))
+        raise StudyError(f"{source}: unknown unit of {dimension} `{unit}`; known units: {listing}")
+    return UNITS[dimension][name]
+
+
+def _unit_of(unit: str, dimension: str) -> str | None:
+    """Return the usual name of a unit of a dimension; None if it is unknown."""
     sizes, plain = UNITS[dimension], plain_unit(unit)
     folded = [name for name in sizes if name.casefold() == plain.casefold()]
-    if plain not in sizes and len(folded) != 1:
-        listing = ", ".join(filter(None, sizes))
-        raise StudyError(f"{source}: unknown unit of {dimension} `{unit}`; known units: {listing}")
-    return sizes[plain if plain in sizes else folded[0]]
+    return plain if plain in sizes else folded[0] if len(folded) == 1 else None
 
 
 def factor(source: str, unit: str, deck: str, dimension: str) -> float:
@@ -356,14 +405,118 @@ def factor(source: str, unit: str, deck: str, dimension: str) -> float:
     return size / unit_size(source, deck, dimension)
 
 
+# Names of columns ---------------------------------------------------------------------------------
+
+
+class ColumnHead(NamedTuple):
+    """Name of a column, and its unit; empty if it has none."""
+
+    name: str
+    unit: str
+
+
+@lru_cache(maxsize=4096)
+def column_head(text: str, dimension: str = "") -> ColumnHead:
+    """Split the header of a column into name and unit.
+
+    A unit is in brackets, or it is a known unit behind a slash (ISO 80000), a blank, an underscore
+    or the word "in". A quotient such as ``m/s`` or ``N/mm`` is a unit and no name with a unit.
+    Behind a blank or an underscore the unit must have the dimension of the quantity, if that is
+    known, and must not be a word of another sense, such as ``in`` or ``min``, if it is not.
+    `dimension` is that of the column's quantity; by default the name tells it.
+
+    >>> column_head("force (filtered) [kN]"), column_head("Kraft/kN")
+    (ColumnHead(name='force', unit='kN'), ColumnHead(name='Kraft', unit='kN'))
+    >>> column_head("Load/Deflection"), column_head("strain_1"), column_head("m/s")
+    (ColumnHead(name='Load/Deflection', unit=''), ColumnHead(name='strain_1', unit=''), \
+ColumnHead(name='m/s', unit=''))
+    """
+    texts = [inside.strip() for inside in _BRACKETS.findall(text)]
+    unit = next((inside for inside in reversed(texts) if inside.casefold() not in REMARKS), "")
+    name = re.split(r"[(\[]", text)[0].strip()
+    if unit:
+        return ColumnHead(_without_in(name).rstrip(" /_"), unit)
+    for head, mark, tail in _ends(name):
+        if _is_read(head, mark, tail, dimension or dimension_of_name(head)):
+            return ColumnHead(head, tail)
+    behind = re.split(r"[)\]]", text)[-1].strip() if texts else ""
+    return ColumnHead(name, behind if _is_unit(behind) else "")
+
+
+def _ends(name: str) -> list[tuple[str, str, str]]:
+    """Return the ways to split a name at a mark: name, mark, and unit, the longest unit first."""
+    splits = []
+    for match in _MARKS.finditer(name, max(0, len(name) - TAIL)):
+        head, tail = name[: match.start()], name[match.end() :]
+        before_in = _without_in(head)
+        mark = "in" if before_in != head else match[0].strip(" _") or " "
+        if before_in and tail:
+            splits.append((before_in, mark, tail))
+    return splits
+
+
+def _without_in(name: str) -> str:
+    """Return a name without the word "in" at its end: ``force in`` kN."""
+    return name[:-3].rstrip(" _") if name[-3:].casefold() in (" in", "_in") else name
+
+
+def _ends_in_unit(name: str) -> bool:
+    """Return whether a name ends in a unit, so that what follows its slash is a part of it.
+
+    The letters s and t are names of a displacement and a time too.
+    """
+    word = re.split(r"[ _,;:-]", name)[-1]
+    return _is_unit(word) and word not in ("", "-", "1", "strain") and name not in ("s", "t")
+
+
+def _is_read(head: str, mark: str, tail: str, dimension: str) -> bool:
+    """Return whether a mark separates a name from its unit."""
+    if not _is_unit(tail) or (mark == "/" and _ends_in_unit(head)):
+        return False
+    if mark in ("/", "in"):
+        return True
+    if dimension:
+        return _unit_of(tail, dimension) is not None and tail not in ("", "-", "1")
+    return plain_unit(tail).casefold() not in AMBIGUOUS
+
+
+def _is_unit(text: str) -> bool:
+    """Return whether a text is a known unit, or a product or quotient of known units."""
+    if any(_unit_of(text, dimension) is not None for dimension in UNITS) or text in OTHER_UNITS:
+        return True
+    parts = [part.rstrip("^0123456789²³") for part in re.split(r"[/*·]", text)]
+    return 1 < len(parts) < 4 and all(part not in ("", "-") and _is_unit(part) for part in parts)
+
+
+def unread_unit(text: str) -> str:
+    """Return what looks like a unit at the end of a header that has none; empty if nothing does."""
+    name = re.split(r"[(\[]", text)[0].strip()
+    if column_head(text).unit or _is_unit(name):
+        return ""
+    for head, mark, tail in _ends(name):
+        is_short = mark in ("/", "in") and re.fullmatch(r"[^\W\d_][^\W\d_]{0,4}|[%°‰].?", tail)
+        is_word = dimension_of_name(tail) or tail.casefold() in REMARKS
+        if (is_short or (_is_unit(tail) and tail not in ("", "-", "1"))) and not is_word:
+            return "" if mark == "/" and _ends_in_unit(head) else tail
+    return ""
+
+
+def dimension_of_name(name: str) -> str:
+    """Return the dimension of the quantity that a name denotes; empty if it is unknown."""
+    folded = name.casefold()
+    for quantity, dimension in DIMENSIONS.items():
+        if folded in WORDS.get(quantity, (quantity.casefold(),)):
+            return dimension
+    return ""
+
+
 def unit_in(name: str) -> str:
-    """Return the unit in brackets behind the name of a column; empty if the name has no unit.
+    """Return the unit in the header of a column; empty if it has none.
 
     >>> unit_in("force (filtered) [kN]")
     'kN'
     """
-    texts = [text.strip() for text in _BRACKETS.findall(name)]
-    return next((text for text in reversed(texts) if text.casefold() not in REMARKS), "")
+    return column_head(name).unit
 
 
 def same_name(name: str, other_name: str) -> bool:
@@ -373,7 +526,7 @@ def same_name(name: str, other_name: str) -> bool:
 
 def unit_free(name: str) -> str:
     """Return the name of a column without its unit."""
-    return re.split(r"[(\[]", name)[0].strip()
+    return column_head(name).name
 
 
 # Reading ------------------------------------------------------------------------------------------

@@ -399,3 +399,111 @@ def test_a_comma_that_may_separate_thousands_is_noted_once_nothing_tells(tmp_pat
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert measurement_of(file, DECK).force.tolist() == [1.06, 1.25, 1.125]
+
+
+@pytest.mark.parametrize(
+    ("head", "size"),
+    [
+        ("Kraft/kN", 1e3),
+        ("Kraft / kN", 1e3),
+        ("Kraft kN", 1e3),
+        ("Kraft_kN", 1e3),
+        ("Kraft in kN", 1e3),
+        ("Kraft in [kN]", 1e3),
+        ("Kraft: kN", 1e3),
+        ("Kraft-kN", 1e3),
+        ("Kraft (kN", 1e3),
+        ("Kraft/kN (gefiltert)", 1e3),
+        ("Force (filtered) kN", 1e3),
+        ("FORCE_KN", 1e3),
+        ("F/N", 1.0),
+        ("F_N", 1.0),
+        ("Load/lbf", 4.4482216152605),
+        ("Load Newtons", 1.0),
+        ("Last in Kilonewton", 1e3),
+        ("force", 1.0),
+    ],
+)
+def test_a_unit_is_read_in_every_notation_with_and_without_columns(
+    tmp_path: Path, head: str, size: float
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"Zeit/ms;note;{head}\n0;1;1\n1;1;2\n2;1;4\n", encoding="utf-8")
+    for columns in ((), ("1", "3"), ("Zeit/ms", head)):
+        read = measurement_of(path, DECK, columns)
+        assert read.force == pytest.approx([size, 2.0 * size, 4.0 * size])
+        assert read.time == pytest.approx([0.0, 1e-3, 2e-3])
+
+
+@pytest.mark.parametrize(
+    ("head", "unread"),
+    [("Load/Deflection", ""), ("force_max", ""), ("force_1", ""), ("m/s", ""), ("N/mm", ""),
+     ("force raw", ""), ("Kraft/tonf", "tonf"), ("force_in", "in"), ("Kraft in t", "t"),
+     ("force_min", "min")],
+)  # fmt: skip
+def test_what_is_no_known_unit_stays_in_the_name_and_is_told_if_it_looks_like_one(
+    tmp_path: Path, head: str, unread: str
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"time (s),{head}\n0,1\n1,2\n2,4\n", encoding="utf-8")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        if unread == "t":
+            with pytest.raises(StudyError, match="unknown unit of force `t`"):
+                measurement_of(path, DECK, ("1", "2"))
+            return
+        assert measurement_of(path, DECK, ("1", "2")).force.tolist() == [1.0, 2.0, 4.0]
+    texts = [str(warning.message) for warning in caught]
+    assert [f"`{unread}` in `{head}` is not read as one" in text for text in texts] == (
+        [True] if unread else []
+    )
+
+
+def test_a_unit_behind_a_slash_is_converted_to_the_units_of_an_indentation_fit(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.csv"
+    rows = "".join(f"{n};{0.01 * n};{2.0 * (0.01 * n) ** 1.5}\n" for n in range(40))
+    path.write_text(f"Zeit/s;Weg/mm;Kraft/kN\n{rows}", encoding="utf-8")
+    for options in ((), ("--columns", "2,3"), ("--columns", "2,3", "--unit", "mm,N")):
+        done = call("indent", "fit", path, *options)
+        assert float(done.stdout.split(" k ")[1].split()[0]) == pytest.approx(2000.0, rel=1e-4)
+
+
+def test_a_table_of_cases_takes_units_in_every_notation(tmp_path: Path) -> None:
+    path = tmp_path / "cases.csv"
+    for head in ("energy/J", "energy J", "energy_J", "energy in J", "energy [J]"):
+        path.write_text(f"{head},velocity_m/s\n1,2\n")
+        assert read_cases(path, "mm-N-s") == [{"energy": 1000.0, "velocity": 2000.0}]
+
+
+def test_a_clock_of_too_few_digits_is_told_with_its_mean_step(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = "".join(f"{3.3e-7 * n:.6f},{n}\n" for n in range(30))
+    path.write_text(f"time (s),force (N)\n{rows}")
+    with pytest.raises(
+        StudyError, match=r":3: time .* of 29 steps are 0: .* too few digits .*is 3\.4"
+    ):
+        measurement_of(path, DECK)
+
+
+@pytest.mark.filterwarnings("always::fecm.FecmWarning")
+def test_a_rise_time_has_a_unit_and_one_below_the_step_is_doubted(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = "".join(f"{0.2 * n:.1f},{float(n > 5)}\n" for n in range(30))
+    path.write_text(f"Time/us,Incident_strain\n{rows}")
+
+    def filtered(text: str) -> tuple[str, str]:
+        done = call("rod", "filter", path, "--filter", text, "-o", "-")
+        assert done.exit_code == 0
+        return done.stdout, done.stderr
+
+    assert filtered("first-order:2")[0] == filtered("first-order:2us")[0]
+    assert filtered("first-order:2us") == filtered("first-order:0.002ms")
+    told = "the rise time 2e-06 us of the filter is below the time step 0.2 us"
+    assert told in filtered("first-order:2e-6")[1]
+    assert told not in filtered("first-order:2us")[1]
+    path.write_text(f"Time,Incident_strain\n{rows}")
+    done = call("rod", "filter", path, "--filter", "first-order:2us", "-o", "-")
+    assert_unusable(done)
+    assert "the times have no unit" in done.stderr

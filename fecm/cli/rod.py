@@ -237,7 +237,10 @@ def filter_(history: Path, transducer: Filter, column: str | None, targets: Outp
     columns time, the history, and filtered.
     """
     series = recorded(history, column)
-    filtered = transducer.in_unit(series.units.get("time", ""))(series.time, series.values)
+    clock = series.units.get("time", "")
+    sensor = transducer.in_unit(clock)
+    sensor.warn_without_effect(series.time, clock)
+    filtered = sensor(series.time, series.values)
     named = {**series.beside, series.name: series.values, "filtered": filtered}
     targets.draw("studies:filter_picture", series.time, named, series.units, series.dimension)
     columns = np.stack([series.time, series.values, filtered], axis=1)

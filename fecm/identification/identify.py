@@ -315,6 +315,8 @@ def fit_deck(
     sensor = None if sensor is None else sensor.in_unit(units.get("time", ""))
     model = ForceModel(deck, _shared_backend(deck), sensor, law, computed)
     clock, force = model.histories([{}])
+    if sensor is not None:
+        sensor.warn_without_effect(clock, units.get("time", ""))
     width = check_measured(measured, clock, force[:, 0], units)
     if len(measured.time) < POINTS:
         text = f"{len(measured.time)} points; at least {POINTS} are needed"

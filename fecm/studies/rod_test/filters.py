@@ -22,10 +22,9 @@ import numpy as np
 
 from fecm._errors import warn
 from fecm._inputs import open_input
-from fecm._measured_tables import read_table
+from fecm._measured_tables import UNITS, plain_unit, read_table
 from fecm._typing import Floats
 from fecm.deck.reader import HDF5
-from fecm.deck.units import KNOWN
 from fecm.results.result import Result, load
 from fecm.results.schema import DATASETS
 from fecm.studies import StudyError
@@ -41,6 +40,7 @@ HIGHEST_ORDER = 10  # poles
 CUT_OFF = 2.0775  # cut-off frequency of the two poles over the class
 SAMPLES = 10  # fewest samples in the time 1/class
 FEWEST = 4.0  # samples in a period of the cut-off frequency of a Butterworth filter
+IN_HERTZ = "frequencies and classes are in Hz, and times without a unit in s"
 SETTLED = 4.0  # periods of the cut-off frequency, per pole, in which a step decays
 UNEQUAL = 0.05  # relative difference up to which time steps are equal: times may be rounded
 
@@ -54,9 +54,11 @@ class FilterKind(StrEnum):
     CFC = "cfc"  # channel frequency class; attenuates sines of 5/3 of the class (Hz) by 3 dB
 
 
+HERTZ = "Hz"
 FILTERS = (  # forms of the text of a filter
     "first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "
-    "step response; butterworth:ORDER,FREQUENCY in Hz, with ,zero-phase if it filters forward and "
+    "step response, in the unit of the history's times or with a unit, as in 10us; "
+    "butterworth:ORDER,FREQUENCY in Hz, with ,zero-phase if it filters forward and "
     "backward; or cfc:60, 180, 600 or 1000 of SAE J211."
 )
 
@@ -71,18 +73,33 @@ class Filter:
     size: float
     order: int = 0  # poles of a Butterworth filter
     is_zero_phase: bool = False
+    unit: str = ""  # of the size; empty for a rise time in the unit of the history
 
     def in_unit(self, time: str) -> Filter:
         """Return the same filter for times in a unit; a class or a frequency is in Hz.
 
-        Raises StudyError if the filter has a class or a frequency and the unit is unknown.
+        Raises StudyError if the size of the filter has a unit, and the unit of time is unknown.
         """
-        if self.kind not in (FilterKind.CFC, FilterKind.BUTTERWORTH) or not time:
+        if not self.unit or (self.unit == HERTZ and not time):
             return self
-        if time not in KNOWN["time"]:
-            message = f"the filter is in Hz, but the unit of time is {time}; s, ms, us are known"
-            raise StudyError(message)
-        return replace(self, size=self.size * KNOWN["time"][time])
+        if plain_unit(time) not in UNITS["time"]:
+            is_in = f"the unit of time is {time}" if time else "the times have no unit"
+            raise StudyError(f"the filter is in {self.unit}, but {is_in}; s, ms, us are known")
+        size = UNITS["time"][plain_unit(time)]
+        if self.unit == HERTZ:
+            return replace(self, size=self.size * size)
+        return replace(self, size=self.size * UNITS["time"][self.unit] / size, unit="")
+
+    def warn_without_effect(self, time: Floats, unit: str) -> None:
+        """Warn if the rise time is below the time step of a history, (rows,), in the same unit."""
+        step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+        if self.unit != HERTZ and self.size < step:
+            rise, dt = (f"{value:.3g} {unit}".rstrip() for value in (self.size, step))
+            warn(
+                f"the rise time {rise} of the filter is below the time step {dt}: the filter "
+                "changes almost nothing; a rise time is in the unit of the times, or has a unit of "
+                f"its own, as in {self.kind}:10us"
+            )
 
     def __call__(self, time: Floats, values: Floats) -> Floats:
         """Filter values, (rows,) or (rows, columns), at increasing times."""
@@ -130,7 +147,7 @@ class Filter:
         if FEWEST * self.size * dt > 1.0:
             raise StudyError(
                 f"a butterworth filter needs {FEWEST:g} samples or more in a period of its "
-                f"frequency, {1 / self.size:g}, and the time step is {dt:g}"
+                f"frequency, {1 / self.size:g}, and the time step is {dt:g}; {IN_HERTZ}"
             )
         sections = butter(self.order, 2.0 * self.size * dt, output="sos")
         rest = sosfilt_zi(sections)
@@ -148,7 +165,7 @@ class Filter:
         if SAMPLES * self.size * dt > 1.0:
             raise StudyError(
                 f"a cfc filter needs {SAMPLES} samples or more in the time 1/class, "
-                f"{1 / self.size:g}, and the time step is {dt:g}: take a lower class"
+                f"{1 / self.size:g}, and the time step is {dt:g}: take a lower class; {IN_HERTZ}"
             )
         a = math.tan(math.pi * CUT_OFF * self.size * dt)
         d = 1.0 + math.sqrt(2.0) * a + a**2
@@ -169,26 +186,35 @@ def _equal_step(time: Floats, kind: str) -> float:
     return dt
 
 
-def filter_of(text: str) -> Filter:
-    """Parse ``first-order:10e-6``, ``moving-average:10e-6``, ``butterworth:4,10e3`` or ``cfc:600``.
+_LETTERS = "".join({*"".join(UNITS["time"]), "µ", "μ"})  # of the units of time
 
-    Classes and frequencies are in Hz. ``butterworth:4,10e3,zero-phase`` filters forward and
-    backward. Raises StudyError if the text is anything else.
+
+def filter_of(text: str) -> Filter:
+    """Parse ``first-order:10us``, ``butterworth:4,10e3`` or ``cfc:600``.
+
+    A rise time has a unit, or is in the unit of the times. Classes and frequencies are in Hz.
+    ``butterworth:4,10e3,zero-phase`` filters forward and backward. Raises StudyError if the text is
+    anything else.
     """
     kind, _, rise = text.partition(":")
     if kind == FilterKind.CFC and rise in CLASSES:
-        return Filter(kind, float(rise))
+        return Filter(kind, float(rise), unit=HERTZ)
     if kind == FilterKind.BUTTERWORTH:
         return _butterworth_of(text, rise)
     if kind not in (FilterKind.FIRST_ORDER, FilterKind.MOVING_AVERAGE):
         raise StudyError(f"unknown filter {text}; use {USAGE}")
+    number = rise.rstrip(_LETTERS).rstrip()
+    unit = plain_unit(rise[len(number) :].strip())
     try:
-        value = float(rise)
+        value = float(number)
     except ValueError:
         value = math.nan
-    if not 0.0 < value < math.inf:
-        raise StudyError(f"{text}: the rise time must be positive; use {USAGE}")
-    return Filter(kind, value)
+    if not 0.0 < value < math.inf or (unit and unit not in UNITS["time"]):
+        raise StudyError(
+            f"{text}: the rise time must be positive, in the unit of the times or in s, ms, us; "
+            f"use {USAGE}"
+        )
+    return Filter(kind, value, unit=unit)
 
 
 def _butterworth_of(text: str, numbers: str) -> Filter:
@@ -204,7 +230,7 @@ def _butterworth_of(text: str, numbers: str) -> Filter:
             f"{text}: a butterworth filter has 1 to {HIGHEST_ORDER} poles and a positive frequency "
             "in Hz, as in butterworth:4,10e3 or butterworth:4,10e3,zero-phase"
         )
-    return Filter(FilterKind.BUTTERWORTH, value, poles, is_zero_phase)
+    return Filter(FilterKind.BUTTERWORTH, value, poles, is_zero_phase, HERTZ)
 
 
 TRANSDUCER = "transducer"

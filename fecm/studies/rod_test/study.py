@@ -235,7 +235,9 @@ def simulate_rod_test(
     )
     filtered = None
     if transducer is not None:
-        sensor = transducer.in_unit(struck.units.get("time", ""))
+        clock = struck.units.get("time", "")
+        sensor = transducer.in_unit(clock)
+        sensor.warn_without_effect(history.time, clock)
         filtered = sensor(history.time, history.forces)
     return PulseTest(**vars(history), rod=rod, filtered=filtered, units=struck.units)
 
