@@ -12,8 +12,8 @@ from fecm.problem import load_deck
 
 # Codes of the rules on test; that of the mesh, W415, depends on the decks' few elements.
 RULES = re.compile(
-    "[NW](430|434|435|437|438|440|446|467|468|469|470|471|472|473|474|475|476|477|478|479|480|481|482"
-    "|550|551|552|553|554|555|556|557|558)"
+    "[NW](430|434|435|437|438|440|446|463|467|468|469|470|471|472|473|474|475|476|477|478|479|480|481|482"
+    "|550|551|552|553|554|555|556|557|558|583|584|585|586|587|588)"
 )
 STRENGTHS = (2326.2, 1200.1, 62.3, 199.8, 92.3, 92.3, 92.3)
 Edit = Callable[[str], str]
@@ -51,6 +51,18 @@ def with_card(keyword: str, *cards: str) -> Edit:
         return new if count else text.replace("EXPE\n", "\n".join([keyword, *cards, "EXPE\n"]))
 
     return edit
+
+
+PLY = ["1.57E-9", "0.32", "171420.0", "9080.0", "5290.0", "5290.0", "3242.86"]
+CONSTANTS = ("density", "nu12", "e1", "e2", "g12", "g13", "g23")
+
+
+def with_ply(**constants: float) -> Edit:
+    """Other constants of the ply."""
+    numbers = dict(zip(CONSTANTS, PLY, strict=True))
+    assert constants.keys() <= numbers.keys()
+    values = [repr(constants[name]) if name in constants else numbers[name] for name in CONSTANTS]
+    return replaced(r"^ +1\.57E-9 .*", ",".join(values))
 
 
 def strengths(*values: float) -> Edit:

@@ -113,7 +113,7 @@ EQUI = Shear(assumed=True, equilibrium=True)
         (["--patch", "disc:0.04"], Patch("DISC", 0.04), EQUI, "of radius 0.04 ins"),
         (["--patch", "none"], None, EQUI, "note: the deck has assumed shear strai"),
         (["--patch", "none", "--shear-factor", "1"], None, Shear(assumed=True), "(SHEA MITC)"),
-        (["--shear", "full"], Patch(), None, "point force (PATC); omit them with --patch none"),
+        (["--shear", "full"], Patch(), None, "point force (PATC); omit it with --patch none"),
         (["--patch", "none", "--shear", "full"], None, None, ""),
     ],
 )  # fmt: skip

@@ -397,6 +397,7 @@ def test_the_summary_has_impact_kinematics_cure_and_threshold() -> None:
     lines = "\n".join(view.lines())
     for line in (
         "impact              1000 mm/s, 1 J",
+        "thickness           2 mm",
         "cure                -155 K",
         "kinematics  ",
     ):

@@ -13,9 +13,21 @@ from fecm.deck import MASS, MATERIALS, NAMES, Allowables, Damping, Finding, conv
 from fecm.mechanics import MeshArrays
 from fecm.problem import clamped_frequency, likely_unit, load_deck, unsupported
 from tests.decks import DATA, ROOT
-from tests.sound_plate import STRENGTHS, Edit, base, found, replaced, strengths, with_card
+from tests.sound_plate import STRENGTHS, Edit, base, found, replaced, strengths, with_card, with_ply
 
 XT, XC, YT, YC, *S = STRENGTHS
+
+
+any_step = replaced(r"^DT,.*", "DT,,0.")
+metal = with_ply(e1=7e4, e2=7e4, nu12=0.3, g12=2692.0, g13=26923.0, g23=26923.0)
+
+
+def thick(text: str) -> str:
+    """The plate with plies of 0.6, 9.6 thick."""
+    text = replaced(r"     0\.184$", "       0.6")(text)
+    return replaced("     2.944$", "       9.6")(text)
+
+
 MISTAKES: dict[str, tuple[Edit, str, str]] = {  # change, code, and what the text must name
     "strengths in Pa": (
         strengths(*(1e6 * s for s in STRENGTHS)), "W467", "look like Pa; mm, N and s need MPa"),
@@ -90,6 +102,38 @@ MISTAKES: dict[str, tuple[Edit, str, str]] = {  # change, code, and what the tex
         with_card("UNIT", "mm kg s"), "W482", "with mm, kg and s the force is in mN"),
     "UNIT in another order": (with_card("UNIT", "N mm s"), "W482", "unit of force, not of length"),
     "mass in kg": (with_card("PROJ", "0,0,0.2"), "W438", "looks like kg; mm, N and s need t"),
+    "E2 a tenth": (with_ply(e2=908.0), "W584", "E2 = 908 looks like it has a digit too few"),
+    "E2 tenfold": (with_ply(e2=90800.0), "W584", "E2 = 90800 looks like it has a digit too many"),
+    "E1 a tenth": (with_ply(e1=17142.0), "W584", "E1 = 17142 looks like it has a digit too few"),
+    "E1 tenfold": (
+        lambda text: any_step(with_ply(e1=1714200.0)(text)), "W584",
+        "E1 = 1.7142e+06 looks like it has a digit too many"),
+    "E2 of glass a tenth": (
+        with_ply(e1=45600.0, e2=1620.0, g12=5830.0, g13=5830.0, g23=5790.0), "W583",
+        "of the shear modulus or of E2"),
+    "G12 a tenth": (with_ply(g12=529.0), "W583", "G12/E2 = 0.058"),
+    "G12 tenfold": (with_ply(g12=52900.0), "W583", "G12/E2 = 5.8"),
+    "G13 a tenth": (with_ply(g13=529.0), "W583", "G13/E2 = 0.058"),
+    "G23 a tenth": (with_ply(g23=324.0), "W583", "G23/E2 = 0.036"),
+    "G12 of a metal a tenth": (
+        lambda text: any_step(metal(text)), "W583",
+        "isotropic ply, E/(2 (1 + NU12)) = 2.692e+04"),
+    "order G23, G13, G12": (with_ply(g12=3242.86, g23=5290.0), "W585", "look exchanged"),
+    "order G12, G23, G13": (with_ply(g13=3242.86, g23=5290.0), "W585", "look exchanged"),
+    "shear factor in per cent of 1": (
+        replaced("^SHEA MITC$", "SHEA MITC\n.0833,"), "W586", "below 0.5"),
+    "50 g in kg": (with_card("PROJ", "0,0,0.05"), "N587", "looks like kg; mm, N and s need t"),
+    "stress-free temperature in kelvin": (
+        with_card("CURE", "-428.,", ",.02E-6,22.5E-6", ""), "W588", "the change would be -155 K"),
+    "the same beside strengths": (
+        with_card("CURE", "-428.,", ",.02E-6,22.5E-6", ""), "W463",
+        "the change of temperature is -428 K"),
+    "diameter of the indenter for the patch of a thick plate": (
+        lambda text: with_card("PATC", "DISC,16.,")(thick(text)), "W475",
+        "radius of the indenter"),
+    "radius of the indenter for the patch of a thick plate": (
+        lambda text: with_card("PATC", "DISC,8.,")(thick(text)), "W475",
+        "radius of the indenter"),
     "velocity in m/s": (
         replaced(r"^(ROD\n.{10}).*", r"\g<1>      1.73"), "W435", "looks like m/s"),
 }  # fmt: skip

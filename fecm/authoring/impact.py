@@ -62,7 +62,7 @@ from fecm.deck.findings import DeckError
 from fecm.deck.grid import IN_PLANE
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Control, Gage
-from fecm.deck.units import units_of
+from fecm.deck.units import MODULUS, quantity, unit_of, units_of
 from fecm.mechanics.laminate import are_cores
 from fecm.mechanics.points import RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
@@ -98,6 +98,26 @@ def _layup_name(laminate: Laminate) -> str:
     repeated = f"{count // unit}" if count > unit else ""
     layup = f"[{'/'.join(plies[:unit])}]{repeated}{symmetric}"
     return layup if len(layup) <= LONGEST_LAYUP else f"{len(plies)} plies"
+
+
+def _note_of_laminate(laminate: Laminate, plies: DeckPlies) -> str:
+    """Return a note with the layup, the number of plies and the thickness of a plate."""
+    names = units_of(plies.system) if plies.system else {}
+    thickness = quantity(plies.thickness, unit_of("length", names))
+    count = len(plies.layups[0])
+    return f"the laminate {_layup_name(laminate)} has {count} plies and is {thickness} thick"
+
+
+def _notes_of_preload(deck: model.Deck, plies: DeckPlies) -> list[str]:
+    """Return a note with the mean stresses under a preload."""
+    if (card := deck.last(model.Preload)) is None:
+        return []
+    names = units_of(plies.system) if plies.system else {}
+    forces = ", ".join(quantity(n, unit_of("force/length", names)) for n in card.forces if n)
+    stresses = ", ".join(
+        quantity(n / plies.thickness, unit_of(MODULUS, names)) for n in card.forces if n
+    )
+    return [f"the preload {forces} is a mean stress of {stresses}"] if forces else []
 
 
 MOST_STEPS = 1e6  # largest plausible number of steps; beyond it, `duration` may have a wrong unit
@@ -424,6 +444,10 @@ def author(request: Request) -> Authored:
     plain = model.Deck("", control, tuple(s for s in segments if s is not None), ())
     if motion.energy is not None:
         plain = with_energy(plain, motion.energy)
+    notes += [
+        _note_of_laminate(request.laminate, plies),
+        *_notes_of_preload(plain, plies),
+    ]
     notes.append(energy_note(plain, plies, per_thickness=request.test is not None))
     is_bare = strike.energy is not None and not str(strike.energy).strip()[-1:].isalpha()
     doubts += doubts_of_energy(plain, fixture, plies, is_bare=is_bare)

@@ -488,4 +488,5 @@ def _additions(deck: Deck) -> list[str]:
         options.append("--shear full")
     if not parts:
         return []
-    return [f"the deck has {' and '.join(parts)}; omit them with {' and '.join(options)}"]
+    them = "them" if len(parts) > 1 else "it"
+    return [f"the deck has {' and '.join(parts)}; omit {them} with {' and '.join(options)}"]

@@ -17,7 +17,7 @@ from fecm._text import significant
 from fecm._typing import FiniteFloat, Floats
 from fecm.deck.macros import flat
 from fecm.deck.model import Cure, Impact, Shear
-from fecm.deck.units import MASS, mass_in_si, quantity, unit_names, unit_of
+from fecm.deck.units import MASS, MODULUS, mass_in_si, quantity, unit_names, unit_of
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
@@ -88,6 +88,8 @@ class ProblemSummary:
         Size of the mesh, and number of free degrees of freedom.
     layers : int
         Plies of the laminate under the load.
+    thickness : float
+        Thickness of this laminate.
     steps : int
         Impact steps of the program.
     nonlinear : bool
@@ -142,6 +144,7 @@ class ProblemSummary:
     nodes: int
     elements: int
     layers: int
+    thickness: float
     equations: int
     steps: int
     nonlinear: bool
@@ -187,6 +190,7 @@ def summary_table(summary: ProblemSummary) -> Table:
     rows: list[Row] = [
         (name, str(getattr(summary, name))) for name in ("nodes", "elements", "equations", "layers")
     ]
+    rows.append(("thickness", _quantity(summary, summary.thickness, "length")))
     if summary.laminate:
         rows.append(("laminate", f"{summary.laminate}, under the load"))
     rows += _stiffness_rows(summary)
@@ -230,6 +234,8 @@ def _plate_rows(summary: ProblemSummary) -> Iterator[Row]:
         named = zip(("N0x", "N0y", "N0xy"), summary.preload, strict=True)
         forces = (f"{name} {in_units(force, 'force/length')}" for name, force in named)
         yield ("preload", ", ".join(forces))
+        stresses = (in_units(n / summary.thickness, MODULUS) for n in summary.preload if n)
+        yield ("preload stress", f"{', '.join(stresses)} on average over the thickness")
     if any(summary.curvature):
         named = zip(("Rx", "Ry", "Rxy"), summary.curvature, strict=True)
         radii = [f"{name} {in_units(1.0 / k, 'length')}" for name, k in named if k]
@@ -307,6 +313,7 @@ def deck_summary(problem: Problem) -> ProblemSummary:
         nodes=deck.control.numnp,
         elements=deck.control.numel,
         layers=len(laminate.plies.angles),
+        thickness=laminate.thickness,
         equations=plate.neq,
         steps=problem.work.steps,
         nonlinear=plate.nonlinear,

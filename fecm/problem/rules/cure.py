@@ -17,6 +17,10 @@ from fecm.results.criteria import exposed
 
 LARGEST_BETA = 0.1  # strain per per cent of weight
 LARGEST_CHANGE = 500.0  # K
+# Cooling, in K, from which the stress-free temperature may be in K and that of use in degrees
+# Celsius; laminates of epoxy cool by 60 to 260 K.
+IN_KELVIN = 320.0
+ICE = 273.15  # K
 # alpha2 of resin plies per degree Fahrenheit; per kelvin it is 19e-6 and more.
 PER_FAHRENHEIT = (8e-6, 18e-6)
 LARGEST_WARP = 0.1  # rise of the free plate over its thickness without a warning
@@ -98,6 +102,28 @@ def large_change(problem: Problem) -> Reports:
         yield Report(message, card.place("change of temperature"), hint)
 
 
+@rule("W588", Subject.LAMINATE)
+def temperature_in_kelvin(problem: Problem) -> Reports:
+    """CURE cools the plies by 320 to 500 K.
+
+    The stress-free temperature may be in kelvin and the temperature of use in degrees Celsius.
+    Laminates of epoxy cool by 60 to 260 K; thermoplastics and polyimides by up to 360 K.
+
+    Remedy: Both temperatures in degrees Celsius: -155 from 177 to 22.
+    """
+    card = problem.deck.last(model.Cure)
+    if card is not None and -LARGEST_CHANGE <= card.delta_t <= -IN_KELVIN:
+        message = (
+            f"CURE cools the plies by {-card.delta_t:g} K, more than epoxy does: the stress-free "
+            "temperature may be in kelvin."
+        )
+        hint = (
+            f"with both temperatures in degrees Celsius the change would be "
+            f"{card.delta_t + ICE:.0f} K"
+        )
+        yield Report(message, card.place("change of temperature"), hint)
+
+
 @rule("W540", Subject.LAMINATE)
 def heated_since_the_cure(problem: Problem) -> Reports:
     """The change of temperature on CURE is positive.
@@ -133,7 +159,11 @@ def cracks_at_rest(problem: Problem) -> Reports:
             f"The laminate cracks before any load: the residual stresses of CURE reach exposure "
             f"{exposure.exposure:.3g} ({where})."
         )
-        yield Report(message, card.place(), "strengths and moduli must be in the same unit")
+        hint = (
+            f"the change of temperature is {card.delta_t:g} K, both temperatures in one unit; "
+            "strengths and moduli must be in the same unit"
+        )
+        yield Report(message, card.place(), hint)
 
 
 @rule("W551", Subject.LAMINATE)
@@ -252,6 +282,7 @@ OF_CURE = (missing_expansion, implausible_expansion)
 VALUES = (
     implausible_moisture,
     large_change,
+    temperature_in_kelvin,
     heated_since_the_cure,
     exchanged_expansions,
     expansion_per_fahrenheit,

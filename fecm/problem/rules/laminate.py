@@ -30,6 +30,20 @@ LOWEST_RATIO = 0.5  # E1/E2 of a ply whose fibres are along 1
 # E1/E2 above which a ply has parallel fibres, and the least and largest NU12 of such plies.
 FIBROUS = 3.0
 LEAST_NU12, MOST_NU12 = 0.1, 0.6
+LARGEST_MODULI_RATIO = 120.0  # E1/E2; plies of pitch fibres have 100
+# Plies of carbon, glass, aramid and boron fibres have G12/E2 and G13/E2 from 0.3 to 0.8 and G23/E2
+# from 0.33 to 0.4; wood has up to 1.6. Outside these limits a digit is missing or too many.
+SHEAR_OF_FIBROUS = {"G12": (0.12, 2.0), "G13": (0.12, 2.0), "G23": (0.06, 2.0)}
+MOST_EXCHANGED = 1.3  # G23/G13 and G13/G12 of plies of parallel fibres are below; boron has 1.2
+SAME_SHEAR = 0.1  # relative difference from an isotropic solid's shear modulus
+OTHER_SHEAR = 1.5  # factor on that modulus above which a digit is missing or too many
+# E1/E2 of a ply with the shear moduli and NU12 of parallel fibres, but one modulus of ten times or
+# a tenth of its value; unbalanced fabrics have smaller NU12, and G12 between the two ratios.
+LOST_DIGIT = (1.1, 2.5)
+NU12_OF_FIBRES = (0.2, 0.4)
+STIFF_IN_SHEAR, SOFT_IN_SHEAR = 0.41, 0.1  # G12/E2
+FIELD = "shear correction factor"
+LEAST_FACTOR = 0.5  # shear correction factor of a solid laminate
 SHOWN_ANGLES = 8
 SHARES = 3  # of plies at 0, ±45 and 90 degrees
 POISSONS_RATIO = "Poisson's ratio NU12"
@@ -215,6 +229,127 @@ def doubtful_poissons_ratio(problem: Problem) -> Reports:
             yield Report(message, place, "NU12 of fibre composites is 0.2 to 0.4")
 
 
+def _is_fibrous(ply: model.Ply) -> bool:
+    """Return whether a ply has parallel fibres; the cells of a core are stiffer in shear."""
+    return ply.e1 > FIBROUS * ply.e2 and max(ply.g13, ply.g23) < ply.e1
+
+
+@rule("W583", Subject.LAMINATE)
+def doubtful_shear_modulus(problem: Problem) -> Reports:
+    """A shear modulus suits neither E2 nor the other shear moduli.
+
+    A digit of the modulus, or of E2, is likely missing or too many. In plies of parallel fibres G12
+    and G13 are 0.12 to 2 times E2, G23 is 0.06 to 2 times E2. In an isotropic ply two shear moduli
+    are E/(2 (1 + NU12)), and the third is not.
+
+    Remedy: G12, G13 and G23 of fibre composites are 0.3 to 0.8 of E2.
+    """
+    for ply in problem.deck.plies.values():
+        moduli = {"G12": ply.g12, "G13": ply.g13, "G23": ply.g23}
+        if _is_fibrous(ply) and ply.e1 <= LARGEST_MODULI_RATIO * ply.e2:  # W584 reports it
+            wrong = {
+                name: f"{name}/E2 = {moduli[name] / ply.e2:.2g}"
+                for name, (least, most) in SHEAR_OF_FIBROUS.items()
+                if not least * ply.e2 <= moduli[name] <= most * ply.e2
+            }
+            if wrong:
+                message = f"{' and '.join(wrong.values())}, unlike in any ply of parallel fibres."
+                hint = (
+                    "G12, G13 and G23 are 0.3 to 0.8 of E2: a digit of the shear modulus or of E2 "
+                    "is missing or too many"
+                )
+                yield Report(message, ply.place(f"shear modulus {next(iter(wrong))}"), hint)
+        shear = ply.e1 / (2.0 * (1.0 + ply.nu12))
+        unlike = [
+            name for name, modulus in moduli.items() if abs(modulus / shear - 1.0) > SAME_SHEAR
+        ]
+        if abs(ply.e1 / ply.e2 - 1.0) < SAME_SHEAR and len(unlike) == 1:
+            (name,) = unlike
+            if not 1.0 / OTHER_SHEAR <= moduli[name] / shear <= OTHER_SHEAR:
+                message = (
+                    f"{name} = {moduli[name]:g} differs from the other two shear moduli, which are "
+                    f"those of an isotropic ply, E/(2 (1 + NU12)) = {shear:.4g}."
+                )
+                hint = "a metal has three equal shear moduli"
+                yield Report(message, ply.place(f"shear modulus {name}"), hint)
+
+
+@rule("W584", Subject.LAMINATE)
+def moduli_with_lost_digit(problem: Problem) -> Reports:
+    """E1/E2 is above 120, or near 1 in a ply that is otherwise one of fibres.
+
+    A digit of E1 or E2 is likely missing or too many. A ply of fabric has E1/E2 near 1 too, but a
+    smaller NU12, and G12 of 0.1 to 0.4 E2.
+
+    Remedy: E1/E2 of plies of glass fibres is about 3, of carbon fibres 10 to 25.
+    """
+    for ply in problem.deck.plies.values():
+        if (suspect := _modulus_with_lost_digit(ply)) is None:
+            continue
+        name, fault = suspect
+        message = (
+            f"E1/E2 = {ply.e1 / ply.e2:.3g} with G12/E2 = {ply.g12 / ply.e2:.2g} and NU12 = "
+            f"{ply.nu12:g} is unlike any ply: {name} = {getattr(ply, name.lower()):g} looks like "
+            f"it has a digit {fault}."
+        )
+        hint = "E1/E2 is about 3 for glass fibres, and 10 to 25 for carbon fibres"
+        yield Report(message, ply.place(f"Young's modulus {name}"), hint)
+
+
+def _modulus_with_lost_digit(ply: model.Ply) -> tuple[str, str] | None:
+    """Return the modulus that seems to have a digit too many or too few, and which of the two."""
+    ratio, shear = ply.e1 / ply.e2, ply.g12 / ply.e2
+    if ratio > LARGEST_MODULI_RATIO:
+        least, most = SHEAR_OF_FIBROUS["G12"]
+        return ("E1", "too many") if least <= shear <= most else ("E2", "too few")
+    (low, high), (least, most) = LOST_DIGIT, NU12_OF_FIBRES
+    if not (low < ratio < high and least <= ply.nu12 <= most):
+        return None
+    if shear > STIFF_IN_SHEAR and 2.0 * min(ply.g13, ply.g23) > ply.g12:
+        return "E1", "too few"
+    return ("E2", "too many") if shear < SOFT_IN_SHEAR else None
+
+
+@rule("W585", Subject.LAMINATE)
+def exchanged_shear_moduli(problem: Problem) -> Reports:
+    """The shear moduli of a ply of parallel fibres are in another order.
+
+    G12 is more than 1.3 times smaller than G13 and G23, or G13 than G23. In such plies G13 is
+    about G12, and G23 is smaller.
+
+    Remedy: G12, G13, G23.
+    """
+    for ply in problem.deck.plies.values():
+        if not _is_fibrous(ply):
+            continue
+        if min(ply.g13, ply.g23) > MOST_EXCHANGED * ply.g12:
+            first, others = "G12", f"G13 = {ply.g13:g} and G23 = {ply.g23:g}"
+        elif ply.g23 > MOST_EXCHANGED * ply.g13:
+            first, others = "G13", f"G23 = {ply.g23:g}"
+        else:
+            continue
+        value = getattr(ply, first.lower())
+        message = (
+            f"{first} = {value:g} is far below {others}, unlike in any ply of parallel fibres: the "
+            "shear moduli look exchanged."
+        )
+        hint = "the order is G12, G13, G23; G13 is about G12, and G23 is smaller"
+        yield Report(message, ply.place(f"shear modulus {first}"), hint)
+
+
+@rule("W586", Subject.POINTS)
+def small_factor(problem: Problem) -> Reports:
+    """The shear correction factor of a solid laminate is below 0.5.
+
+    Remedy: 5/6 for one material, 0.6 to 0.9 for laminates; `SHEA EQUI` computes it.
+    """
+    card = problem.deck.last(model.Shear)
+    if card is not None and card.factor < LEAST_FACTOR and not problem.laminate.has_core:
+        message = f"The shear correction factor is {card.factor:g}, below {LEAST_FACTOR:g}."
+        hint = "laminates have 0.6 to 0.9, one material 5/6; SHEA EQUI needs no factor"
+        yield Report(message, card.place(FIELD), hint)
+
+
 @rule("W558", Subject.LAMINATE)
 def thin_core(problem: Problem) -> Reports:
     """The core of a sandwich is thinner than its thinnest ply.
@@ -375,6 +510,10 @@ OF_LAYERS = (invalid_layer_thickness, layer_out_of_order)
 VALUES = (
     moduli_exchanged,
     doubtful_poissons_ratio,
+    moduli_with_lost_digit,
+    doubtful_shear_modulus,
+    exchanged_shear_moduli,
+    small_factor,
     thin_core,
     large_angle,
     shares_as_angles,
@@ -382,9 +521,6 @@ VALUES = (
     impossible_thickness,
     thick_plate,
 )
-
-
-FIELD = "shear correction factor"
 
 
 @rule("E427", Subject.POINTS)

@@ -19,6 +19,7 @@ from fecm.problem.rules.contact import sphere_radius
 from fecm.results.exposures import RESOLVED
 
 LARGE = 2.0  # radius of a patch over the thickness, and over the radius of the contact
+INDENTER = 0.5  # radius of a patch over that of a sphere with the deck's k
 
 
 @rule("E442", Subject.POINTS)
@@ -208,10 +209,13 @@ def patch_away_from_node(problem: Problem) -> Reports:
         yield Report(message, place, "leave x0 and y0 blank for the node of ROD")
 
 
-def _large_patch(problem: Problem) -> str:
-    """Describe a patch far larger than thickness and contact; empty for other patches."""
+def _large_patch(problem: Problem, limit: float) -> str:
+    """Describe a patch with a radius above a limit and far above that of the contact.
+
+    The text is empty for other patches.
+    """
     card, thickness = problem.deck.last(model.Patch), problem.laminate.thickness
-    if card is None or card.radius is None or card.radius <= LARGE * thickness:
+    if card is None or card.radius is None or card.radius <= limit:
         return ""
     law = problem.deck.require(model.Indentation)
     with np.errstate(all="ignore"):
@@ -238,11 +242,13 @@ def _radius_hint(card: model.Patch) -> str:
 def large_patch(problem: Problem) -> Reports:
     """The radius of the patch looks like the radius of the indenter.
 
-    It is more than twice the thickness, and more than twice the radius of the contact.
+    It is more than twice the radius of the contact, and more than twice the thickness or half the
+    radius of a sphere with this k.
 
     Remedy: The radius of the contact, or blank for 0.327 h.
     """
-    if _judges_stresses(problem) and (what := _large_patch(problem)):
+    limit = min(LARGE * problem.laminate.thickness, INDENTER * sphere_radius(problem.deck))
+    if _judges_stresses(problem) and (what := _large_patch(problem, limit)):
         card = problem.deck.require(model.Patch)
         message = (
             f"The {what}. It looks like the radius of the indenter: stresses and exposures under "
@@ -255,11 +261,13 @@ def large_patch(problem: Problem) -> Reports:
 def large_patch_without_stresses(problem: Problem) -> Reports:
     """The radius of the patch is large, but only the force depends on it.
 
-    As W475, where the program has neither FAIL nor PLYS.
+    The program has neither FAIL nor PLYS. The radius is more than twice the radius of the contact
+    and the thickness.
 
     Remedy: The radius of the contact, or blank for 0.327 h.
     """
-    if not _judges_stresses(problem) and (what := _large_patch(problem)):
+    limit = LARGE * problem.laminate.thickness
+    if not _judges_stresses(problem) and (what := _large_patch(problem, limit)):
         card = problem.deck.require(model.Patch)
         yield Report(f"the {what}", card.place("radius c"), _radius_hint(card))
 

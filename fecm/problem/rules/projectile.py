@@ -23,6 +23,7 @@ REPORT_UNITS = [KNOWN["length"]["in"], KNOWN["force"]["lbf"], KNOWN["time"]["s"]
 # Mass of the projectile over the mass of the plate.
 LIGHTEST = 1.0e-4
 HEAVIEST = 2.0e3
+HEAVY = 500.0  # drop weights have 50 to 300
 USUAL_MASS_RATIO = 10.0
 MOST_ENERGY = 2e5  # per thickness, N; 200 J per mm
 # Wave speed in the rod over that along the fibres: lead and polythene are above 1/30.
@@ -128,11 +129,29 @@ def doubtful_mass(problem: Problem) -> Reports:
 
     Remedy: Mass in force·time²/length: t in mm, N and s; pounds over 386.09 in in, lbf and s.
     """
-    deck, plate, projectile = problem.deck, problem.plate, build_projectile(problem.deck)
-    ratio = projectile.total_mass / plate.total_mass()
-    if LIGHTEST <= ratio <= HEAVIEST:
-        return
-    mass, names = projectile.total_mass, unit_names(deck)
+    ratio = build_projectile(problem.deck).total_mass / problem.plate.total_mass()
+    if not LIGHTEST <= ratio <= HEAVIEST:
+        yield _report_of_mass(problem, ratio)
+
+
+@rule("N587", Subject.IMPACT)
+def heavy_projectile(problem: Problem) -> Reports:
+    """The mass of the projectile is 500 to 2000 times the plate's.
+
+    Drop weights have 50 to 300 times the mass of the plate. A mass in kg in mm, N and s is a
+    thousand times too large, a weight in pounds in in, lbf and s 386 times.
+
+    Remedy: Mass in force·time²/length: t in mm, N and s; pounds over 386.09 in in, lbf and s.
+    """
+    ratio = build_projectile(problem.deck).total_mass / problem.plate.total_mass()
+    if HEAVY < ratio <= HEAVIEST:
+        yield _report_of_mass(problem, ratio)
+
+
+def _report_of_mass(problem: Problem, ratio: float) -> Report:
+    """Return a report about the mass of the projectile, and the unit that it seems to be in."""
+    deck, names = problem.deck, unit_names(problem.deck)
+    mass = build_projectile(deck).total_mass
     message = f"The projectile's mass {mass:.4g} is {ratio:.3g} times the plate's"
     size = in_si(MASS, names)
     usual = USUAL_MASS_RATIO * mass / ratio * (size or 1.0)
@@ -146,7 +165,7 @@ def doubtful_mass(problem: Problem) -> Reports:
         hint += ": a weight in pounds is divided by 386.09 in/s^2"
     elif not names:
         hint += ": t in mm, N and s; pounds over 386.09 in in, lbf and s"
-    yield Report(f"{message}.", place, hint)
+    return Report(f"{message}.", place, hint)
 
 
 @rule("W439", Subject.IMPACT)
@@ -263,5 +282,5 @@ OF_NUMBER = (invalid_number_of_elements,)
 OF_PROJECTILE = (invalid_projectile, unknown_transducer)
 # Of diameters without other errors; one of these is enough.
 OF_DIAMETERS = (invalid_diameter, rod_out_of_range)
-VALUES = (doubtful_mass, doubtful_rod, rod_thicker_than_long, large_energy)
+VALUES = (doubtful_mass, heavy_projectile, doubtful_rod, rod_thicker_than_long, large_energy)
 WITHOUT_PROJECTILE = (reports_rod, reports_rod_in_other_units)
