@@ -7,10 +7,12 @@ Python alike. A package therefore states its names once, and importing it import
 from __future__ import annotations
 
 import ast
+import sys
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 
 def names_of_stub(
@@ -21,7 +23,9 @@ def names_of_stub(
     @cache
     def origins() -> dict[str, tuple[str, str]]:
         """Return the module of each name, and its name there."""
-        stub = ast.parse(Path(file).with_suffix(".pyi").read_text("utf-8"))
+        # The loader reads the stub of a package in a zip file too.
+        loader: Any = sys.modules[package].__loader__
+        stub = ast.parse(loader.get_data(str(Path(file).with_suffix(".pyi"))))
         return {
             alias.asname or alias.name: (statement.module or package, alias.name)
             for statement in stub.body

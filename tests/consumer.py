@@ -21,6 +21,8 @@ late: NDArray[np.float64] = result.tape3.time[result.tape3.step > 10]
 worst: float = float(result.failure.puck.exposure.max())
 title: str = result.title
 doubts: tuple[str, ...] = result.notes
+peak: float = result.peak_force + result.metrics.peak_force + result.metrics["impulse"]
+unit_of_peak: str = result.metrics.unit("peak_force")
 several: fecm.Result | list[fecm.Result] = fecm.run(Path("plates.inp"))
 deck: fecm.Deck = fecm.read_one("plate.inp")
 again: fecm.Result = fecm.run_one(deck, progress=lambda step, steps: print(step / steps))
@@ -165,6 +167,7 @@ coefficient: float = fecm.contacts()["report-0.5"].converted("mm-N-s").k
 
 result.plot("forse")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 result.forse  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
+result.metrics.peak_forse  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
 result.tape3.u  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
 several.force  # type: ignore[union-attr]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
 fecm.run_one("plate.inp", mode="raport")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]

@@ -106,6 +106,11 @@ class CaseTable(Protocol):
         """Return the values of a column."""
 
 
+def index_of(cases: object) -> Any:
+    """Return the index of a DataFrame of cases; None for other cases."""
+    return getattr(cases, "index", None) if isinstance(cases, CaseTable) else None
+
+
 def _rows(table: CaseTable) -> list[dict[Any, Any]]:
     """Return the rows of a table as mappings; raise CasesError if a column is repeated."""
     names = list(table.columns)

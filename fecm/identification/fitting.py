@@ -110,7 +110,7 @@ class Scaling:
         return np.where(self.size > 0.0, self.size, list(self.values(x).values()))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FittedPoints:
     """Fitted parameters, and the points to which they were fitted."""
 

@@ -27,7 +27,7 @@ LABEL_WIDTH = 13
 PLATE_ERRORS = "Change of the values with 1 % more of a property of the plate in the deck"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Identification:
     """Parameters of an impact, fitted to a measured force.
 

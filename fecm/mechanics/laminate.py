@@ -49,7 +49,7 @@ def are_cores(plies: Sequence[PlyConstants]) -> list[bool]:
     return [ply.g13 < SOFT_CORE * stiffest for ply in plies]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlyStack:
     """Plies of a laminate, starting at z = -h/2."""
 
@@ -76,7 +76,7 @@ class EngineeringConstants(NamedTuple):
     nu_xy: float  # Poisson's ratio: contraction along y over extension along x
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LaminateSection:
     """Stiffness and inertia of a laminate, per area."""
 

@@ -11,7 +11,7 @@ from fecm.problem.loading import AnyDeck, LoadedDeck, load_deck
 from fecm.problem.summary import ProblemSummary, deck_summary, summary_table
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DeckCheck:
     """Findings and summaries of a deck before it runs; ``str()`` is what ``fecm check`` prints.
 

@@ -76,7 +76,7 @@ def larger_steps(problem: Problem) -> list[str]:
     return [f"time step         DT is at most {largest / least:.2f} of the critical one; {fewer}"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ProblemSummary:
     """Numbers of a problem without errors, in the deck's units.
 

@@ -33,6 +33,7 @@ from fecm.results.metrics import SUMMARY as SUMMARY
 from fecm.results.metrics import THRESHOLD as THRESHOLD
 from fecm.results.metrics import VERDICTS as VERDICTS
 from fecm.results.metrics import IndentationMetrics as IndentationMetrics
+from fecm.results.metrics import MetricAttributes as MetricAttributes
 from fecm.results.metrics import Projectiles as Projectiles
 from fecm.results.metrics import impact_metrics as impact_metrics
 from fecm.results.pictures import RunKind as RunKind

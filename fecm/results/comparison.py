@@ -22,7 +22,7 @@ TRIGGER = 0.5  # time between two rises, over the time above half of the peak
 Source = str | Path | tuple[Any, Any]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measurement:
     """Measured force in the deck's units."""
 

@@ -63,31 +63,54 @@ GROUPS = {
 STORED_BY = {name: info.macro for name, info in GROUPS.items() if info.macro}
 
 
-def not_stored(asked: str, paths: Collection[str]) -> str:
-    """Return the message about a missing dataset: similar names, or the macro that stores it."""
+def check_name(name: object, explanation: str) -> str:
+    """Return the name of a dataset or column; raise TypeError with an explanation if it is no text.
+
+    Examples
+    --------
+    >>> check_name(0, "a result has datasets by name")
+    Traceback (most recent call last):
+    TypeError: [0]: a result has datasets by name
+    """
+    if not isinstance(name, str):
+        raise TypeError(f"[{name!r}]: {explanation}")
+    return name
+
+
+def not_stored(asked: str, paths: Collection[str], others: Iterable[str] = ()) -> str:
+    """Return the message about a missing dataset: similar names, or the macro that stores it.
+
+    `others` are names that are not datasets, such as metrics.
+    """
     if members := sorted(path for path in paths if path.startswith(f"{asked}/")):
         return f"{asked} is a group, not a dataset; its datasets are {', '.join(members)}"
     group = asked.partition("/")[0]
     group_exists = any(path.startswith(f"{group}/") for path in paths)
-    more = suggestion(asked, paths) if group_exists else remedy(asked) or suggestion(asked, paths)
+    alike = suggestion(asked, paths, others)
+    more = alike if group_exists else remedy(asked) or alike
     return f"there is no {asked} in this result{more}"
 
 
-def suggestion(asked: str, paths: Iterable[str]) -> str:
+def suggestion(asked: str, paths: Iterable[str], others: Iterable[str] = ()) -> str:
     """Return the end of a message about a missing name: similar names, or the groups."""
     import difflib  # 1 ms, only after a mistake
 
-    known_names = sorted(
-        {name for path in paths for name in (path, path.rpartition("/")[0])} - {""}
-    )
+    of_paths = {name for path in paths for name in (path, path.rpartition("/")[0])} - {""}
+    known_names = sorted({*of_paths, *others})
     last_parts = [name.rpartition("/")[2] for name in known_names]
     close = difflib.get_close_matches(asked, last_parts, n=3) if "/" not in asked else []
+    words = set(asked.split("_"))
+    with_words = [last for last in last_parts if words <= set(last.split("_"))]
+    # The most similar name comes first.
     alike = [
-        name for name, last in zip(known_names, last_parts, strict=True) if last in (asked, *close)
+        name
+        for part in dict.fromkeys([asked, *(close or with_words)])
+        for name, last in zip(known_names, last_parts, strict=True)
+        if last == part
     ]
     if alike := alike or difflib.get_close_matches(asked, known_names, n=3):
         return f"; did you mean {' or '.join(alike)}?"
-    groups = sorted({name.partition("/")[0] for name in known_names})
+    groups = sorted({name.partition("/")[0] for name in of_paths})
     return f"; there are {', '.join(groups)}" if groups else ""
 
 

@@ -71,6 +71,31 @@ METRICS = {
     **THRESHOLD,
 }
 INTEGERS = ("contacts", "peak_contact")
+
+
+class MetricAttributes:
+    """Names of :data:`METRICS` as attributes, for type checkers and editors."""
+
+    peak_force: float
+    time_of_peak: float
+    peak_contact: float
+    first_peak: float
+    contacts: float
+    contact_time: float
+    last_contact: float
+    max_indentation: float
+    permanent_indentation: float
+    impulse: float
+    rebound_velocity: float
+    energy_absorbed: float
+    contact_loop: float
+    max_deflection: float
+    threshold_force: float
+    threshold_margin: float
+    threshold_time: float
+    time_above: float
+
+
 # Metrics of a search for velocities.
 FOUND = {
     "found_velocity": Quantity(

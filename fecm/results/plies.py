@@ -24,7 +24,7 @@ IN_PLANE = ("sigma_1", "sigma_2", "tau_12")
 INTERLAMINAR = ("tau_xz", "tau_yz")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlyResults:
     """Stresses and strains of plies, in the deck's units.
 

@@ -13,7 +13,8 @@ from fecm.deck.model import Deck
 from fecm.results import schema
 from fecm.results.end import End
 from fecm.results.groups import NotStoredError, ResultGroup, not_stored
-from fecm.results.run_metrics import end_of, metrics_of
+from fecm.results.metrics import METRICS, MetricAttributes
+from fecm.results.run_metrics import ImpactMetrics, end_of, metrics_of
 from fecm.results.stored import Stored
 
 if TYPE_CHECKING:
@@ -30,12 +31,13 @@ if TYPE_CHECKING:
     from fecm.results.plies import PlyGroup
 
 
-class Result(Stored, schema.ContactRows):
+class Result(Stored, schema.ContactRows, MetricAttributes):
     """Result of a run.
 
     Every dataset is available as ``result["tape3/w"]`` and ``result.tape3.w``; the columns of the
     history (``time``, ``force``, ``indentation``, ``transducer``, ``displacement``, ``velocity``,
-    ``acceleration``, ``plate_w``, ``step``) also as ``result.force``.  Units are those of the deck.
+    ``acceleration``, ``plate_w``, ``step``) also as ``result.force``, and the impact metrics as
+    ``result.peak_force``.  Units are those of the deck.
 
     Parameters
     ----------
@@ -107,14 +109,14 @@ class Result(Stored, schema.ContactRows):
         return end_of(self)
 
     @property
-    def metrics(self) -> dict[str, float]:
-        """Impact metrics by the names of :data:`fecm.results.metrics.METRICS`.
+    def metrics(self) -> ImpactMetrics:
+        """Impact metrics by name, as items and as attributes, such as ``metrics.peak_force``.
 
         Empty without impact steps.  Unknown values are NaN: those that the :attr:`end` of the run
         has not decided, those that need a deck that can't be read, the time of a threshold that is
         not reached.
         """
-        return metrics_of(self)
+        return ImpactMetrics(metrics_of(self), self.units, self.validity)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the history as a pandas DataFrame: one row per step, indexed by time.
@@ -384,12 +386,17 @@ class Result(Stored, schema.ContactRows):
                 return self[f"history/{name}"]
             if any(path.startswith(f"{name}/") for path in self._arrays):
                 return schema.GROUP_TYPES.get(name, ResultGroup)(name, self)
-            raise NotStoredError(not_stored(name, self._arrays))
+            metrics = self.metrics
+            if name in METRICS:
+                return metrics[name]
+            attributes = [other for other in object.__dir__(self) if other[0] != "_"]
+            raise NotStoredError(not_stored(name, self._arrays, [*attributes, *metrics]))
 
     def __dir__(self) -> list[str]:
         heads = {path.partition("/")[0] for path in self._arrays}
         columns = [p.partition("/")[2] for p in self._arrays if p.startswith("history/")]
-        return [*super().__dir__(), *heads, *columns]
+        metrics = METRICS if columns else ()
+        return [*super().__dir__(), *heads, *columns, *metrics]
 
     def __repr__(self) -> str:
         steps = len(self["history/time"]) if "history/time" in self else 0

@@ -4,22 +4,116 @@ from __future__ import annotations
 
 import contextlib
 import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fecm._errors import ResultFileError
+from fecm._table import Row, Table, html_table, text_lines
 from fecm.deck.model import Impact
+from fecm.deck.units import quantity, unit_of
 from fecm.results.end import Deflection, End, time_to_decide
+from fecm.results.groups import NotStoredError, remedy, suggestion
 from fecm.results.metrics import (
     INTEGERS,
     METRICS,
     MOBILITY,
     IndentationMetrics,
+    MetricAttributes,
     Metrics,
     Projectiles,
     impact_metrics,
 )
 from fecm.results.stored import Stored
+
+NOT_KNOWN = "not known"
+
+
+class ImpactMetrics(dict[str, float], MetricAttributes):
+    """Impact metrics of a run: ``metrics.peak_force`` is ``metrics["peak_force"]``.
+
+    The values are numbers in the deck's units, and NaN where they are not known. ``print`` shows
+    them with their units and meanings.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Values by the names of :data:`~fecm.results.metrics.METRICS`; empty without impact steps.
+    units : dict of str to str
+        Names of the units of length, force and time; empty if the deck names none.
+    validity : str
+        ``"ok"``, or the reasons to doubt the result.
+
+    Examples
+    --------
+    >>> import fecm
+    >>> metrics = fecm.run_one(fecm.examples.path("impact-patch")).metrics
+    >>> f"{metrics.peak_force:.2f} {metrics.unit('peak_force')}"
+    '85.01 lbf'
+    """
+
+    def __init__(self, values: Mapping[str, float], units: dict[str, str], validity: str) -> None:
+        super().__init__(values)
+        self.units: dict[str, str] = units
+        self.validity: str = validity
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a metric; empty for a pure number, or if the deck names no units.
+
+        Raises
+        ------
+        NotStoredError
+            If there is no such metric; a KeyError.
+        """
+        if name not in self:
+            raise self._lacks(name)
+        return unit_of(METRICS[name].dimension, self.units)
+
+    def _lacks(self, name: str) -> NotStoredError:
+        """Return the error about an unknown name, or about a metric that this run does not have."""
+        if name not in METRICS:
+            reason = suggestion(str(name), (), METRICS) or f"; there are {', '.join(METRICS)}"
+        elif self:
+            reason = "; add DELA to the deck and run it again"
+        else:
+            reason = remedy("history")
+        return NotStoredError(f"there is no metric {name} in this result{reason}")
+
+    def __missing__(self, name: str) -> float:
+        raise self._lacks(name)
+
+    if not TYPE_CHECKING:  # so that a misspelt name is a type error
+
+        def __getattr__(self, name):
+            if name.startswith("_"):
+                raise AttributeError(name)
+            return self[name]
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self]
+
+    def _table(self) -> Table:
+        """Return the metrics with their units and meanings, and the doubts about the result."""
+        rows: list[Row] = [
+            (name, self._formatted(name, value), METRICS[name].description)
+            for name, value in self.items()
+        ]
+        if self.validity:
+            rows.append(("validity", self.validity, ""))
+        return Table(tuple(rows), ("metric", "value", "meaning"), "impact metrics")
+
+    def _formatted(self, name: str, value: float) -> str:
+        return quantity(value, self.unit(name)) if math.isfinite(value) else NOT_KNOWN
+
+    def __str__(self) -> str:
+        if not self:
+            return "no impact metrics: the run has no impact steps"
+        return "\n".join(text_lines(self._table()))
+
+    def _repr_html_(self) -> str:
+        """Return a table of the metrics, for notebooks."""
+        return html_table(self._table())
 
 
 def end_of(stored: Stored) -> End | None:

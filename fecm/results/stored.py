@@ -16,11 +16,15 @@ from fecm._typing import Array
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader
 from fecm.deck.units import declared_units, unit_of
-from fecm.results.groups import Attributes, NotStoredError, not_stored
+from fecm.results.groups import Attributes, NotStoredError, check_name, not_stored
 from fecm.results.metrics import METRICS, VALIDITY
 from fecm.results.schema import KINEMATICS, Kinematics, dataset_of
 
 BLOCK = 4_000_000  # bytes
+ONE_RESULT = (
+    "a result has datasets by name, as in result['force']; fecm.run_one returns one result, and "
+    "fecm.run a list only for a deck with several problems"
+)
 
 
 def row_blocks(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
@@ -170,7 +174,7 @@ class Stored:
 
     def _path(self, name: str) -> str:
         """Return the path of a dataset, or of a column of the history by its name alone."""
-        path = name.strip("/")
+        path = check_name(name, ONE_RESULT).strip("/")
         column = f"history/{path}"
         return column if path not in self._arrays and column in self._arrays else path
 
@@ -180,6 +184,8 @@ class Stored:
         Raises NotStoredError if it is not stored.
         """
         path = self._path(name)
+        if name in METRICS and path not in self._arrays:
+            raise NotStoredError(f"{name} is a metric, not a dataset: write result.{name}")
         if path not in self._arrays:
             raise NotStoredError(not_stored(path, self._arrays))
         return path

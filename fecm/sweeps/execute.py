@@ -45,9 +45,10 @@ DEATHS = 3  # of workers without a finished task, after which the remaining task
 LOOK = 0.5  # polling interval in seconds
 PATIENCE = 5.0  # seconds for the scheduler to answer
 LOST = "lost with its worker"
+GUARD = '`if __name__ == "__main__":`'
 UNGUARDED = (
     "no worker process could start: each imports the script that is running; call fecm there under "
-    '`if __name__ == "__main__":`'
+    f"{GUARD}"
 )
 MOST_ADDRESS = 100_000  # bytes of a file with the scheduler's address
 
@@ -235,15 +236,30 @@ def on_dask(tasks: Sequence[Task], scheduler: Any, done: Done, idle: Idle) -> No
 
 
 def on_executor(tasks: Sequence[Task], executor: futures.Executor, done: Done, idle: Idle) -> None:
-    """Run tasks on any executor; tasks that it loses become failed cases."""
-    for task, future in _run_on(executor, tasks, idle):
-        try:
-            outcome = future.result()
-        except Exception as error:
-            outcome = Outcome.failed(
-                dict.fromkeys(task.numbers, f"{LOST} ({format_exception(error)})")
-            )
-        done(task, outcome)
+    """Run tasks on any executor; tasks that it loses become failed cases.
+
+    Raises SchedulerError if the executor breaks: it takes no further tasks.
+    """
+    broken: futures.BrokenExecutor | None = None
+    try:
+        for task, future in _run_on(executor, tasks, idle):
+            try:
+                outcome = future.result()
+            except futures.BrokenExecutor as error:  # tasks that are finished still follow
+                broken = error
+                continue
+            except Exception as error:
+                outcome = Outcome.failed(
+                    dict.fromkeys(task.numbers, f"{LOST} ({format_exception(error)})")
+                )
+            done(task, outcome)
+    except futures.BrokenExecutor as error:
+        broken = error
+    if broken is not None:
+        raise SchedulerError(
+            f"the executor broke ({format_exception(broken)}): a worker process died or could not "
+            f"start; a script whose pool spawns processes calls fecm under {GUARD}"
+        )
 
 
 def address_in(file: Path) -> str:
@@ -324,13 +340,16 @@ def carry_out_plan(
     finished = 0
     count = len(definition.cases)
 
+    def progress() -> str:
+        text = f"after {finished} of {count} cases"
+        if parts is not None:
+            call = "the same call" if parts.resumes else "the same call with resume=True"
+            text += f"; {call} resumes this sweep"
+        return text
+
     def idle() -> None:
         if watch.stops():
-            text = f"stopped after {finished} of {count} cases"
-            if parts is not None:
-                call = "the same call" if parts.resumes else "the same call with resume=True"
-                text += f"; {call} resumes this sweep"
-            raise StoppedError(text)
+            raise StoppedError(f"stopped {progress()}")
 
     def keep(task: Task, outcome: Outcome) -> None:
         nonlocal finished
@@ -348,7 +367,12 @@ def carry_out_plan(
         model, whole = _by_model(problem, definition, definition.settings.modes, run, watch)
     if parts is not None:
         parts.tasks = whole
-    outcomes = [outcome for _, outcome in run(whole, keep)]
+    try:
+        outcomes = [outcome for _, outcome in run(whole, keep)]
+    except SchedulerError as error:
+        if not finished:
+            raise
+        raise SchedulerError(f"{error}; the sweep ended {progress()}") from None
     history = definition.settings.history and keeps_forces
     return sweep_result(definition, merge(outcomes, history=history), model)
 

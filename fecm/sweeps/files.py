@@ -138,7 +138,7 @@ def _numbers(contents: FileContents, path: str, shape: tuple[int, ...]) -> Float
 def _statistics(contents: FileContents, name: str, first: tuple[int, ...]) -> Statistics:
     values = _numbers(contents, f"statistics/{name}", (*first, 3 + len(QUANTILES)))
     draws, mean, deviation = np.moveaxis(values[..., :3], -1, 0)
-    return Statistics(draws.astype(int), mean, deviation, values[..., 3:])
+    return Statistics(draws.astype(int)[()], mean[()], deviation[()], values[..., 3:])
 
 
 def _indices(contents: FileContents, name: str, first: tuple[int, ...], laws: int) -> Indices:

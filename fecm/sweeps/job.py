@@ -20,7 +20,7 @@ from fecm._options import documented, option, with_parameters_of
 from fecm._table import Row, Table, html_table
 from fecm._watch import LOGGER, CallerWatch, Progress, Watch
 from fecm.authoring.case import Case, CasesError, Limit, parse_exceed
-from fecm.authoring.cases import CaseTable, cases_of, texts_of
+from fecm.authoring.cases import CaseTable, cases_of, index_of, texts_of
 from fecm.authoring.values import NAMES
 from fecm.deck.catalogue import system_of
 from fecm.mechanics.contact_law import Law
@@ -493,13 +493,17 @@ class Sweep:
                     self.path, self.plan.fingerprint(), restart=self.overwrite, resume=self.resume
                 )
             result = self._computed(parts, watch, keeps_forces=keeps_forces or parts is None)
+            result.index = index_of(self.cases)
             self._save(result, parts, watch)
         return result
 
     def _computed(
         self, parts: PartialResults | None, watch: Watch, *, keeps_forces: bool
     ) -> SweepResult:
-        """Compute the cases; delete the partial results of a sweep that can't be computed."""
+        """Compute the cases; delete the partial results of a sweep that can't be computed.
+
+        If workers are missing, finished tasks are kept.
+        """
         done = _same_names() if callable(self.measure) else lambda task, outcome: None
         try:
             return carry_out_plan(
@@ -511,8 +515,12 @@ class Sweep:
                 done=done,
                 keeps_forces=keeps_forces,
             )
-        except (CasesError, SchedulerError):
+        except CasesError:
             if parts is not None:
+                parts.clear()
+            raise
+        except SchedulerError:
+            if parts is not None and not parts.has_tasks:
                 parts.clear()
             raise
 

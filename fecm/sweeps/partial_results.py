@@ -133,6 +133,11 @@ class PartialResults:
             file.write(data)
             file.write(hashlib.sha256(data).digest())
 
+    @property
+    def has_tasks(self) -> bool:
+        """Whether an outcome is stored."""
+        return any(self.folder.glob("task-*"))
+
     def forces(self) -> Iterator[Forces]:
         """Read the contact forces of each task; None if all its cases failed."""
         for task in self.tasks:

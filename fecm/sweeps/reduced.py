@@ -175,7 +175,7 @@ LIMIT = 0.02  # largest difference of the peaks, relative to the full run
 TRIAL_COLUMNS = tuple(d.name for d in SWEEP_DATASETS.values() if d.group == GROUP)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ReducedModel:
     """Reduced model of a sweep, beside full runs of some of its cases.
 

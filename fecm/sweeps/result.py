@@ -73,6 +73,8 @@ class SweepResult(StoredSweep):
         Full runs beside the reduced model; None if the cases are not by that model.
     law : str
         Name of the contact law that took the place of EXPE; empty if none did.
+    index : pandas.Index or None
+        Index of the DataFrame that was given as `cases`. A file does not store it.
     """
 
     def __repr__(self) -> str:
@@ -123,12 +125,26 @@ class SweepResult(StoredSweep):
     def to_dataframe(self) -> pandas.DataFrame:
         """Return values and results as a table with one row per case (requires pandas).
 
-        ``attrs["units"]`` has the units of the columns that have one.
+        The rows have the index of the DataFrame that was given as `cases`, so that pandas joins
+        both row by row. Otherwise, and if the result comes from a file, the index is the number of
+        the case. ``attrs["units"]`` has the units of the columns that have one.
+
+        Examples
+        --------
+        >>> import pandas
+        >>> from fecm import sweep
+        >>> tests = pandas.DataFrame({"velocity": [115.0, 50.0]}, index=["B", "A"])
+        >>> table = sweep("decks/appendix.inp", cases=tests).to_dataframe()
+        >>> float(table["velocity"]["A"])
+        50.0
         """
         import pandas
 
-        table = pandas.DataFrame({**self.cases, **self.summary})
-        table.index.name = "case"
+        numbers = pandas.RangeIndex(len(self), name="case")
+        index = numbers if self.index is None else self.index
+        if index.name is None and index.equals(numbers):
+            index = numbers
+        table = pandas.DataFrame({**self.cases, **self.summary}, index=index)
         table.attrs["units"] = {str(n): unit for n in table.columns if (unit := self.unit(str(n)))}
         return table
 
@@ -137,7 +153,8 @@ class SweepResult(StoredSweep):
 
         A full grid has one dimension per name of its values, which are the coordinates: numbers in
         ascending order, texts in the order of the cases. Other cases have the dimension ``case``.
-        The last dimension of ``force`` is ``step``. ``units`` are the deck's units.
+        The last dimension of ``force`` is ``step``, with the coordinate ``time`` if all cases have
+        the same time step. ``units`` are the deck's units.
 
         Raises
         ------
@@ -178,7 +195,10 @@ class SweepResult(StoredSweep):
         places = {name: (name, values, about(name)) for name, values in coordinates.items()}
         data_set = xarray.Dataset(variables, places, {"title": self.title})
         if self.force is not None:
-            data_set = data_set.assign_coords(step=np.arange(1, self.force.shape[1] + 1))
+            steps = np.arange(1, self.force.shape[1] + 1)
+            data_set = data_set.assign_coords(step=steps)
+            if len(np.unique(self.dt)) == 1:
+                data_set = data_set.assign_coords(time=("step", self.dt[0] * steps, about("dt")))
         return data_set.set_coords(list(self.cases))
 
     def export(

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._arrays import compared_by_identity
 from fecm._typing import Bools, Floats
 from fecm.authoring.case import THRESHOLD, Limit, check_limits
 from fecm.results.metrics import THRESHOLD_FORCE, VALIDITY, VERDICTS
@@ -25,14 +26,15 @@ Z = 1.959963984540054  # the standard normal distribution is 0.975 there
 ROUNDING = 1e-12  # variation relative to the largest value below which a quantity is constant
 
 
+@compared_by_identity
 class Statistics(NamedTuple):
     """Statistics of a quantity over the draws that have a value.
 
     Attributes
     ----------
-    draws : ndarray of int
-        Number of these draws.
-    mean, standard_deviation : ndarray
+    draws : int
+        Number of these draws; with varied values, an array (combinations,), as the others.
+    mean, standard_deviation : float
         Mean and standard deviation of the quantity.
     quantiles : ndarray (5,)
         Quantiles at the probabilities 1, 5, 50, 95 and 99 %.
@@ -44,6 +46,7 @@ class Statistics(NamedTuple):
     quantiles: Floats  # at `QUANTILES`
 
 
+@compared_by_identity
 class Indices(NamedTuple):
     """Sobol' indices of a quantity; with varied values, the combinations come first.
 
@@ -72,7 +75,8 @@ def statistics(values: Floats) -> Statistics:
         [np.quantile(row, QUANTILES) if len(row) else none for row in kept],
     )
     arrays = map(np.array, columns)
-    return Statistics(*(a.reshape((*values.shape[:-1], *a.shape[1:])) for a in arrays))
+    # The index () makes a number of an array without axes.
+    return Statistics(*(a.reshape((*values.shape[:-1], *a.shape[1:]))[()] for a in arrays))
 
 
 def indices(values: Floats, seed: int) -> Indices:
@@ -153,6 +157,7 @@ Columns = Mapping[str, Column]
 MANY_FAILED = 0.01  # share of failed draws above which the results are doubtful
 
 
+@compared_by_identity
 class Exceedance(NamedTuple):
     """Probabilities that quantities exceed limits; with varied values, the combinations first.
 
@@ -181,7 +186,7 @@ class Exceedance(NamedTuple):
     open: NDArray[np.int64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RandomResult:
     """Results of a random sweep.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from fecm.authoring.values import REFINE, dimension_of
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_of
 from fecm.problem.loading import load_deck
-from fecm.results.groups import NotStoredError
+from fecm.results.groups import NotStoredError, check_name
 from fecm.results.metrics import COLUMNS, VALIDITY
 from fecm.results.schema import SWEEP_DATASETS
 from fecm.results.stored import deck_in
@@ -34,7 +35,7 @@ OWN_DIMENSIONS = {
 }
 
 
-@dataclass(repr=False)
+@dataclass(repr=False, eq=False)
 class StoredSweep:
     """Values, results and deck of a sweep; see :class:`fecm.SweepResult`."""
 
@@ -50,6 +51,7 @@ class StoredSweep:
     random: RandomResult | None = None
     reduced: ReducedModel | None = None
     law: str = ""
+    index: Any = None
 
     def __post_init__(self) -> None:
         self.cases = {name: read_only(values) for name, values in self.cases.items()}
@@ -63,10 +65,21 @@ class StoredSweep:
 
     def __getitem__(self, name: str) -> Column:
         """Return values or results of every case, by name."""
+        name = check_name(name, "a sweep has columns by name; rows are in to_dataframe()")
         for columns in (self.cases, self.summary):
             if name in columns:
                 return columns[name]
         raise self._lacks(name)
+
+    if not TYPE_CHECKING:  # so that a misspelt name is a type error
+
+        def __getattr__(self, name):
+            if name.startswith("_") or "summary" not in vars(self):
+                raise AttributeError(name)
+            return self[name]
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self]
 
     def __contains__(self, name: str) -> bool:
         return name in self.cases or name in self.summary

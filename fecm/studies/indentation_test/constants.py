@@ -87,7 +87,7 @@ class Cycle:
     k_1_measured: FittedValue | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ContactLawFit:
     """Contact law fitted to a test, with its curves."""
 

@@ -94,7 +94,7 @@ def parameter_layout(division: Division, tied: frozenset[int] = frozenset()) -> 
     return ParameterLayout(corners, permanents, origins, size)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Curves:
     """Curves of a test, scaled by its largest indentation and force."""
 

@@ -21,7 +21,7 @@ from fecm.studies.indentation_test.curves import LIMITS_Q, FittedValue
 from fecm.studies.indentation_test.turns import Test, read_test
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class IndentationFit:
     """Contact law fitted to an indentation test; ``str()`` is the page of `fecm indent fit`.
 

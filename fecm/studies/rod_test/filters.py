@@ -236,7 +236,7 @@ def _butterworth_of(text: str, numbers: str) -> Filter:
 TRANSDUCER = "transducer"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TimeHistory:
     """History of a quantity."""
 

@@ -109,7 +109,7 @@ COUNTS = 0.01  # share of the pulse's peak above which a row counts in the mean 
 POINTS = ("struck_end", "middle", "far_end")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RodHistory:
     """History of a rod under a pulse."""
 

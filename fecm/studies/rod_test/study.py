@@ -49,7 +49,7 @@ class Struck(NamedTuple):
     units: dict[str, str]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PulseTest(RodHistory):
     """History of a rod under a pulse; ``str()`` is the summary of `fecm rod`.
 

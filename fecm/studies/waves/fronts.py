@@ -44,7 +44,7 @@ ORDERS = np.array(list(permutations(range(5))))  # orders in which five modes ma
 FRONTS = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fronts:
     """The five fronts for a series of normals.
 

@@ -134,7 +134,7 @@ MODES = ("flexural_1", "flexural_2", "flexural_3", "extension", "in_plane_shear"
 _PAIRS = np.array(list(combinations(range(5), 2)))  # candidates for the two in-plane modes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Dispersion:
     """Harmonic waves in one direction.
 

@@ -10,15 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecm._errors import StudyError
+from fecm._table import Row, Table, html_table, text_lines
 from fecm.authoring.laminate import Laminate, stiffness_of_laminate
 from fecm.authoring.parameters import check_positive
 from fecm.deck.model import Deck
-from fecm.deck.units import unit_names
+from fecm.deck.units import VELOCITY, quantity, unit_names, unit_of
 from fecm.mechanics.laminate import LaminateSection as Stiffness
 from fecm.problem.loading import sole_problem
 from fecm.problem.problem import Problem
 from fecm.studies.waves.fronts import Cusp, Fronts, WaveSurfaces
 from fecm.studies.waves.harmonic import Dispersion, Medium, dispersion
+
+NORMALS = (0.0, 45.0, 90.0)  # of the fronts that ``print`` shows
 
 
 class Waves:
@@ -113,6 +116,28 @@ class Waves:
         if not (np.isfinite([time, start]).all() and time >= 0.0 and start >= 0.0):
             raise StudyError(f"time {time:g} and radius {start:g} must not be negative")
         return self.surfaces.cusps(time, start)
+
+    def _table(self) -> Table:
+        """Return the velocities of the fronts along three normals."""
+        speed, length = (unit_of(kind, self.units) for kind in (VELOCITY, "length"))
+        fronts = self.fronts(NORMALS)
+        rows: tuple[Row, ...] = tuple(
+            (mode, *(quantity(value, speed) for value in values))
+            for mode, values in zip(fronts.modes, fronts.velocity.T, strict=True)
+        )
+        header = ("front", *(f"normal at {normal:g} deg" for normal in NORMALS))
+        return Table(rows, header, f"waves in a laminate of {quantity(self.thickness, length)}")
+
+    def __repr__(self) -> str:
+        return f"<fecm {self._table().title}>"
+
+    def __str__(self) -> str:
+        table = self._table()
+        return "\n".join([table.title, *text_lines(table), *(f"note: {n}" for n in self.notes)])
+
+    def _repr_html_(self) -> str:
+        """Return the table of velocities, for notebooks."""
+        return html_table(self._table())
 
 
 def waves(
