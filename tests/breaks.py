@@ -212,6 +212,17 @@ def standing_plate(
     right(impact, motion, rod, law, replace(contact, plate_moves=False), *args)
 
 
+def started_at_zero(right: Any, impact: Any, state: Any, *args: Any) -> None:
+    state.start_w = 0.0
+    right(impact, state, *args)
+
+
+def without_nodal_forces(
+    right: Any, motion: Any, state: Any, dt: Any, factor: Any, applied: Any = None, **kwargs: Any
+) -> None:
+    right(motion, state, dt, 0.0, applied, **kwargs)
+
+
 def work_of_the_new_force(right: Any, step: Any, law: Any, state: Any, w: Any) -> None:
     last = state.contact
     right(step, law, state, w)

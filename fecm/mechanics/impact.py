@@ -6,7 +6,8 @@ step.  Then the projectile's implicit step and the contact law are iterated on t
 acceleration, at most five times.
 
 Signs: w is positive along the push; the projectile's motion is positive away from the plate.  The
-indentation is therefore -u_tip - w.
+projectile starts on the plate, whose displacement is then w_0: 0, or that of a static load.  The
+indentation is therefore -u_tip - (w - w_0).
 """
 
 from __future__ import annotations
@@ -44,6 +45,7 @@ class ImpactState(ContactState[float]):
     """State of plate, projectile and contact after a step."""
 
     plate: PlateState = field(kw_only=True)  # the plate, with the number of steps and the time
+    start_w: float | None = None  # w_0 in the contact law; None before the first impact step
 
 
 @dataclass(frozen=True)
@@ -108,9 +110,11 @@ class ImpactSystem:
     ) -> None:
         """Take one step and change the state; `factor` is the load factor of FORC's values.
 
-        A `force` replaces the contact force on the plate.  Raises DivergenceError if the
-        indentation or the force is no longer finite.
+        A `force` replaces the contact force on the plate.  In the first step the projectile starts
+        on the plate.  Raises DivergenceError if the indentation or the force is no longer finite.
         """
+        if state.start_w is None:
+            state.start_w = self.deflection(state.plate)
         self.motion.advance(state.plate, dt, factor, self.applied(state, force))
         step = state.plate.step
         try:
@@ -130,10 +134,15 @@ class ImpactSystem:
             )
         return self._step
 
+    def deflection(self, plate: PlateState) -> float:
+        """Return the plate's displacement in the contact law."""
+        return self.contact.load.dot(plate.padded) if self.contact.plate_moves else 0.0
+
     def move_projectile(self, state: ImpactState, dt: float) -> None:
         """Advance projectile and contact to the plate's time."""
-        w = self.contact.load.dot(state.plate.padded) if self.contact.plate_moves else 0.0
-        couple_step(self.rod_step(dt), self.law, state, w)
+        w = self.deflection(state.plate)
+        couple_step(self.rod_step(dt), self.law, state, w - (state.start_w or 0.0))
+        state.plate_w = w
 
 
 def _update_memory(iterating: Any, tried: Any, memory: Any) -> Any:
@@ -146,7 +155,10 @@ def _update_memory(iterating: Any, tried: Any, memory: Any) -> Any:
 def couple_step(
     step: TipStep[Any, Number], law: Law[Number], state: ContactState[Number], w: Number
 ) -> None:
-    """Iterate contact force and tip acceleration for the plate's w, and change the state."""
+    """Iterate contact force and tip acceleration for the plate's w, and change the state.
+
+    w is measured from the plate's displacement before the impact.
+    """
     last = state.contact
     motion, base, drift, acceleration = step.begin(state.rod)
     carried = (1.0 - step.theta) * last.force

@@ -45,6 +45,9 @@ SERIAL = 8192
 # equation.
 SHORT = 2048
 NEAR = 8
+# Largest motion in a step of a plate in equilibrium, relative to its displacement. Rounding gives
+# 1e-14; a plate whose load is taken away moves by (w dt)^2, which is 1e-6 in its slowest modes.
+RESTING = 1.0e-9
 
 
 class DivergenceError(FecmError, ArithmeticError):
@@ -323,6 +326,19 @@ class PlateMotion:
         if self._loads is not None:
             force += factor * self._loads
         return force
+
+    def rests_under_load(self, state: PlateState, dt: float, factor: float) -> bool:
+        """Return whether the nodal forces, times `factor`, hold a deflected plate in equilibrium.
+
+        The plate moves in a step dt by less than :data:`RESTING` of its displacement, both in the
+        norm of the mass.
+        """
+        u = state.displacement
+        if not u.any():
+            return False
+        residual = self.unbalanced(state, factor)
+        moved = dt**4 * float(residual @ (residual * self._inverse_mass))
+        return moved <= RESTING**2 * float(u @ (u * self.mass))
 
     def advance(
         self,

@@ -16,6 +16,7 @@ from fecm.plot import data, style
 from fecm.plot.kinds import Against, Face, Picture, PlotError, Width
 from fecm.results.comparison import Source, compare_force, measurement_of
 from fecm.results.result import Result
+from fecm.results.run_metrics import start_w_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -232,9 +233,12 @@ def loop(results: Results, *, against: Against | None = None, width: Width = "co
     drawn = {}
     for name, result in results.items():
         x, values = data.require_datasets(result, name, f"history/{column}", "history/force")
-        drawn[name] = np.append(0.0, sign * x), np.append(0.0, values)
+        start = start_w_of(result) if against == "deflection" else 0.0
+        drawn[name] = np.append(start, sign * x), np.append(0.0, values)
     # Without force the bodies move apart: the axis ends with the contact.
-    touched = np.concatenate([[0.0], *(x[force > 0.0] for x, force in drawn.values())])
+    touched = np.concatenate(
+        [part for x, force in drawn.values() for part in (x[:1], x[force > 0.0])]
+    )
     length = style.scale_of(results, "length", [touched])
     pound = style.scale_of(results, "force", [f for _, f in drawn.values()])
     figure, (axes,) = style.panels(width, tall=1.2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
@@ -36,6 +37,7 @@ from fecm.report.content import (
 )
 from fecm.report.figures import inside, stack
 from fecm.results.result import Result
+from fecm.results.run_metrics import impact_energy
 from fecm.results.summary import radii_of
 
 PLY = (
@@ -169,9 +171,9 @@ def impactor(result: Result, deck: model.Deck) -> Impactor | None:
         return None
     projectile = build_projectile(deck)
     mass, velocity = projectile.total_mass, impact.velocity
-    initial = result.attributes_of("energy").get("initial")
-    if isinstance(initial, float) and velocity:
-        mass = 2.0 * initial / velocity**2
+    energy = impact_energy(result)
+    if math.isfinite(energy) and velocity:
+        mass = 2.0 * energy / velocity**2
     user_projectile = result.attributes.get("projectile")
     kind = "rigid mass" if isinstance(projectile, RigidMass) else "elastic rod"
     name = f"{user_projectile}, instead of PROJ" if user_projectile else kind

@@ -33,6 +33,7 @@ from fecm.results.exposures import (
 )
 from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
+from fecm.results.run_metrics import impact_energy
 from fecm.results.summary import UNDECIDED
 from fecm.results.validity import (
     BENT,
@@ -249,9 +250,9 @@ def _load(problem: Problem) -> Judgement:
 
 def _numerical(result: Result) -> Iterator[Judgement]:
     """Judge the energy balance and the contact iteration."""
-    initial = result.attributes_of("energy").get("initial")
-    if "energy/balance_error" in result and isinstance(initial, float) and initial > 0.0:
-        worst = float(np.abs(result["energy/balance_error"]).max(initial=0.0)) / initial
+    energy = impact_energy(result)
+    if "energy/balance_error" in result and energy > 0.0:
+        worst = float(np.abs(result["energy/balance_error"]).max(initial=0.0)) / energy
         level = TrustLevel.WITHIN if worst < BALANCED else TrustLevel.DOUBTFUL
         size: Cell = ShownNumber(worst, f"{worst:.2g}")
         words = "largest error, of the energy put in"

@@ -73,7 +73,7 @@ class LastContact(NamedTuple):
     # Velocity of the projectile away from the plate, relative to the rigid motion of a plate that
     # is not held; NaN if it is not known.
     leaving: Floats
-    position: Floats  # displacement of the projectile's centre, positive along the push
+    position: Floats  # displacement of the projectile's centre from its start, along the push
 
 
 class Deflection(NamedTuple):
@@ -86,32 +86,51 @@ class Deflection(NamedTuple):
     # Largest w |w|/(2 E): under a static load the ratio is the flexibility of a plate that its
     # supports hold, and under no load it is larger.
     compliance: Floats
+    # Displacement when the impact started, and where the plate rests under its load: both are 0
+    # without a static load.
+    start: Floats | float = 0.0
+    rest: Floats | float = 0.0
 
     @classmethod
-    def of(cls, w: Floats, times: Floats, energy: Floats, initial: float) -> Self:
+    def of(
+        cls,
+        w: Floats,
+        times: Floats,
+        energy: Floats,
+        initial: float,
+        *,
+        start: float = 0.0,
+        rest: float = 0.0,
+    ) -> Self:
         """Summarise the history of one case.
 
         Parameters
         ----------
         w, times, energy : ndarray (steps,)
-            Displacement under the load, time, and energy of the plate after each step.
+            Displacement under the load, time, and energy of the plate after each step. The energy
+            is that above the rest.
         initial : float
             Energy of the projectile before the impact.
+        start, rest : float
+            Displacement before the first step, and at rest under the load.
         """
         row = int(w.argmax())
-        dw, dt = np.diff(w, prepend=0.0), np.diff(times, prepend=0.0)
-        ratio = w * np.abs(w) / (2.0 * np.maximum(energy, LEAST_WORK * initial))
+        dw, dt = np.diff(w, prepend=start), np.diff(times, prepend=0.0)
+        moved = w - rest
+        ratio = moved * np.abs(moved) / (2.0 * np.maximum(energy, LEAST_WORK * initial))
         return cls(
             w[[row]],
             w[-1:],
             np.abs(dw / dt).max(keepdims=True),
             energy[-1:],
             np.nanmax(ratio, keepdims=True, initial=0.0),
+            start,
+            rest,
         )
 
     @property
     def reach(self) -> Floats:
-        """Return the largest displacement that the energy in the plate can still cause.
+        """Return the largest displacement from its rest that the energy of the plate can cause.
 
         A plate that is held by its supports and has the energy E deflects by at most sqrt(2 C E),
         where C is its static flexibility.
@@ -137,7 +156,7 @@ def ends(last: LastContact, plate: Deflection, *, is_held: bool = True) -> Texts
     is_clear = last.leaving > CLEAR * plate.speed
     is_falling = last.force < np.minimum(last.before, FALLEN * last.contact_peak)
     passed = touching & is_clear & is_falling & (last.force < FALLEN * last.peak)
-    is_near = ~(last.position < -plate.reach) if is_held else np.ones_like(touching)
+    is_near = ~(_from_rest(last, plate) < -plate.reach) if is_held else np.ones_like(touching)
     states = {
         End.PASSED: passed,
         End.RISING: touching,
@@ -152,7 +171,12 @@ def time_to_decide(last: LastContact, plate: Deflection) -> Floats:
 
     Only cases that may touch again need it.
     """
-    return np.maximum(last.position + plate.reach, 0.0) / last.leaving
+    return np.maximum(_from_rest(last, plate) + plate.reach, 0.0) / last.leaving
+
+
+def _from_rest(last: LastContact, plate: Deflection) -> Floats:
+    """Return the position of the projectile relative to the plate at rest."""
+    return last.position + (plate.start - plate.rest)
 
 
 def over(end: Texts) -> Bools:
@@ -183,5 +207,5 @@ def settled_deflection(end: Texts, plate: Deflection, *, is_held: bool = True) -
     thirds of those that had the energy to exceed their largest deflection later did so. The
     displacement of a plate that is not held by its supports only says that the plate moves.
     """
-    is_bounded = plate.reach <= RINGING * plate.largest
+    is_bounded = plate.reach <= RINGING * (plate.largest - plate.rest)
     return np.where(over(end) & (is_bounded | (not is_held)), plate.largest, np.nan)

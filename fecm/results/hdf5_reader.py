@@ -25,7 +25,7 @@ from fecm.results import schema
 from fecm.results.criteria import OWN_CRITERIA, criteria_of
 from fecm.results.exposures import AT_REST, LOAD_FACTOR
 from fecm.results.groups import NotStoredError, not_stored
-from fecm.results.metrics import MOBILITY
+from fecm.results.metrics import INITIAL_PLATE, MOBILITY, REST_W, START_W
 from fecm.results.schema import FORMAT_VERSION, Form
 
 ELEMENTS = "mesh/elements"
@@ -329,8 +329,8 @@ def first_misfit(
 # Attributes that are numbers, and lists of texts, by group.  A result without the
 # attributes of history and energy lacks only its summary.
 NUMBERS = {
-    "energy": ("initial",),
-    "history": ("permanent_indentation", "unsettled_steps", MOBILITY),
+    "energy": ("initial", INITIAL_PLATE),
+    "history": ("permanent_indentation", "unsettled_steps", MOBILITY, START_W, REST_W),
     "threshold": ("force", "time", "margin"),
     "patch": ("x", "y", "radius"),
 }

@@ -146,6 +146,12 @@ def described(name: str) -> str:
 
 
 MOBILITY = "rigid_mobility"  # attribute of a run whose plate is not held; see `Judge`
+# Attributes of a run whose plate is deflected when the impact starts. Those of the history are
+# displacements under the load: where the projectile starts, and where the nodal forces hold the
+# plate during the impact, if they do. That of the energy is the plate's part of the initial energy.
+START_W = "start_w"
+REST_W = "rest_w"
+INITIAL_PLATE = "initial_plate"
 PART = 16  # cases whose forces stay in the cache
 
 

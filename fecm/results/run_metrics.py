@@ -16,9 +16,12 @@ from fecm.deck.units import quantity, unit_of
 from fecm.results.end import Deflection, End, time_to_decide
 from fecm.results.groups import NotStoredError, remedy, suggestion
 from fecm.results.metrics import (
+    INITIAL_PLATE,
     INTEGERS,
     METRICS,
     MOBILITY,
+    REST_W,
+    START_W,
     IndentationMetrics,
     MetricAttributes,
     Metrics,
@@ -116,6 +119,17 @@ class ImpactMetrics(dict[str, float], MetricAttributes):
         return html_table(self._table())
 
 
+def start_w_of(stored: Stored) -> float:
+    """Return the displacement of the plate under the load when the impact starts."""
+    return _number(stored.attributes_of("history").get(START_W, 0.0))
+
+
+def impact_energy(stored: Stored) -> float:
+    """Return the energy of the projectile before the impact, without energy of a static load."""
+    energy = stored.attributes_of("energy")
+    return _number(energy.get("initial")) - _number(energy.get(INITIAL_PLATE, 0.0))
+
+
 def end_of(stored: Stored) -> End | None:
     """Return the state of the contact at the end of the run; None without impact steps."""
     metrics = _summarised(stored)
@@ -145,7 +159,7 @@ def _summarised(stored: Stored) -> Metrics | None:
         permanent=np.array([_number(history.get("permanent_indentation"))]),
         work=stored["energy/contact_work"][-1:],
     )
-    initial = _number(stored.attributes_of("energy").get("initial"))
+    initial = impact_energy(stored)
     velocity = np.float64(_impact_velocity(stored))
     with np.errstate(all="ignore"):
         return impact_metrics(
@@ -175,8 +189,18 @@ def steps_to_decide(stored: Stored) -> int | None:
 def deflection_of(stored: Stored) -> Deflection:
     """Return the motion of the plate under the load in a run with impact steps."""
     energy = stored["energy/plate_kinetic"] + stored["energy/plate_strain"]
-    initial = _number(stored.attributes_of("energy").get("initial"))
-    return Deflection.of(stored["history/plate_w"], stored["history/time"], energy, initial)
+    rest = stored.attributes_of("history").get(REST_W)
+    if rest is not None:  # the energy above the equilibrium under the load
+        of_plate = _number(stored.attributes_of("energy").get(INITIAL_PLATE, 0.0))
+        energy = energy - of_plate - stored["energy/external_work"]
+    return Deflection.of(
+        stored["history/plate_w"],
+        stored["history/time"],
+        energy,
+        impact_energy(stored),
+        start=start_w_of(stored),
+        rest=0.0 if rest is None else _number(rest),
+    )
 
 
 def _impact_velocity(stored: Stored) -> float:

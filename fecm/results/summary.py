@@ -25,7 +25,8 @@ from fecm.results.exposures import (
     largest_exposures,
 )
 from fecm.results.groups import GROUPS
-from fecm.results.run_metrics import end_of, metrics_of
+from fecm.results.metrics import INITIAL_PLATE
+from fecm.results.run_metrics import end_of, impact_energy, metrics_of, start_w_of
 from fecm.results.schema import DATASETS
 from fecm.results.stored import Stored, row_blocks
 from fecm.results.validity import CROSSED
@@ -403,7 +404,7 @@ def _quantity(result: Stored, value: float, dimension: str, digits: int = DIGITS
 
 def _impact(result: Stored) -> list[Row]:
     """Return rows about forces, contacts, indentation and energy of an impact."""
-    lines = [("peak force", _peak_force(result))]
+    lines = [*_before_impact(result), ("peak force", _peak_force(result))]
     if intervals := _intervals(result):
         indentation, w = result["history/indentation"], result["history/plate_w"]
         lines += [
@@ -415,6 +416,17 @@ def _impact(result: Stored) -> list[Row]:
             lines.append(("rebound", _rebound(result)))
             lines.append(("contact loop", _contact_loop(result)))
     return [*lines, ("energy balance", _energy_balance(result))]
+
+
+def _before_impact(result: Stored) -> list[Row]:
+    """Return the row about a plate that a static load has deflected before the impact."""
+    start = start_w_of(result)
+    energy = result.attributes_of("energy").get(INITIAL_PLATE, 0.0)
+    if not (start or energy):
+        return []
+    deflection = f"w {_quantity(result, start, 'length')} under the load"
+    text = f"{deflection}, strain energy {_quantity(result, energy, 'force*length')}"
+    return [("before impact", f"{text}, which is not impact energy")]
 
 
 def _peak_force(result: Stored) -> str:
@@ -500,14 +512,13 @@ def _contact_loop(result: Stored) -> str:
     work = metrics_of(result)["contact_loop"]
     if abs(work) <= np.abs(result["energy/balance_error"]).max():  # of an elastic law
         return f"{_quantity(result, 0.0, 'force*length')} kept by the indentation"
-    initial = float(result.attributes_of("energy")["initial"])
-    share = f"{work / initial:.1%} of the impact energy"
+    share = f"{work / impact_energy(result):.1%} of the impact energy"
     return f"{_quantity(result, work, 'force*length')} kept by the indentation, {share}"
 
 
 def _energy_balance(result: Stored) -> str:
-    """Format the largest error of the energy balance, relative to the initial energy."""
-    initial = float(result.attributes_of("energy")["initial"])
+    """Format the largest error of the energy balance, relative to the impact energy."""
+    initial = impact_energy(result)
     worst = float(np.abs(result["energy/balance_error"]).max())
     share = f"{worst / initial:.2g} of the initial" if initial else f"{worst:.3g}, initially"
     return f"worst error {share} {_quantity(result, initial, 'force*length')}"

@@ -34,7 +34,7 @@ from fecm.results.schema import dataset_of
 from fecm.results.sinks import Operation
 from fecm.simulation.simulation import Simulation
 
-FORMAT = 6
+FORMAT = 7
 OTHER_FORMAT = "another kind of checkpoint"
 SOLVER = "another solver"
 STARTS_OVER = "overwrite=True without resume=True discards the checkpoint and starts over"

@@ -24,7 +24,7 @@ from fecm.results.exposures import (
     largest_exposures,
 )
 from fecm.results.result import Result
-from fecm.results.run_metrics import steps_to_decide
+from fecm.results.run_metrics import start_w_of, steps_to_decide
 from fecm.results.stored import row_blocks
 from fecm.results.validity import (
     BENT,
@@ -294,6 +294,7 @@ def judge_run(simulation: Simulation, result: Result) -> RunVerdict:
         notes.append(OPEN_ENDS[end] + _remedy(result, end))
     notes += [*_later_peak(result), *_late_values(result, end)]
     notes += [*_pull(simulation, result), *_gravity(simulation, result)]
+    notes += _springs_back(simulation, result)
     reasons = [Reason.AGAIN] if end is End.AGAIN else [Reason.OPEN] if end in OPEN_PEAKS else []
     reasons += [doubt.reason for doubt in beyond]
     peak_force = simulation.state.monitor.peak_force
@@ -357,7 +358,8 @@ def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
         return
     stiffness, pull = support
     peak = int(force.argmax())
-    if pull > PULL and result["history/plate_w"][peak] * stiffness > STATIC * force[peak]:
+    w = result["history/plate_w"][peak] - start_w_of(result)
+    if pull > PULL and w * stiffness > STATIC * force[peak]:
         yield (
             f"the supports pull the plate down with {pull:.0%} of a static load at the "
             "impact; a window or a ring can only push: the plate lifts off there, is softer, and "
@@ -381,6 +383,7 @@ def _gravity(simulation: Simulation, result: Result) -> Iterator[str]:
     if not energy or not in_contact.any():
         return
     way = (result["history/plate_w"] + result["history/indentation"])[in_contact].max()
+    way -= start_w_of(result)
     share = float(mass * STANDARD_GRAVITY / unit * way / energy)
     x = 0.5 * share
     rise = x + math.hypot(1.0, x) - 1.0
@@ -389,6 +392,18 @@ def _gravity(simulation: Simulation, result: Result) -> Iterator[str]:
             f"gravity is left out: the weight of a projectile that falls adds {share:.1%} to the "
             "impact energy until it turns (M g w); the force and the deflection are then about "
             f"{rise:.0%} larger"
+        )
+
+
+def _springs_back(simulation: Simulation, result: Result) -> Iterator[str]:
+    """Yield a note if the plate is deflected before the impact and nothing holds it so."""
+    start = start_w_of(result)
+    if start and simulation.state.rest_factor is None:
+        w = quantity(start, unit_of("length", result.units))
+        yield (
+            f"the impact starts at w = {w} under the load, but the nodal forces do not hold the "
+            "plate there during the impact: it moves without the projectile too; the load factor "
+            "of the static solution would hold it"
         )
 
 

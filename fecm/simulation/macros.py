@@ -68,9 +68,21 @@ def impact_step(run: Simulation, n: int) -> None:
     stores = program.is_output(plate.step + 1, steps, n)
     if stores and program.strains_precede_step:
         recorder.strains([plate.step + 1], [plate.time], run.displacement_field()[None])
-    system.advance(impact, state.dt, run.force_factor(), state.prop_force)
+    factor = run.force_factor()
+    if impact.start_w is None and run.model.motion.rests_under_load(plate, state.dt, factor):
+        state.rest_factor = factor
+    system.advance(impact, state.dt, factor, state.prop_force)
     state.prop_force = None
-    recorder.steps.step(plate, impact, run.force_factor(), on_tape9=program.has_contact(stores))
+    factor = run.force_factor()
+    if factor != state.rest_factor:
+        state.rest_factor = None
+    recorder.steps.step(
+        plate,
+        impact,
+        factor,
+        on_tape9=program.has_contact(stores),
+        is_loaded_at_rest=state.rest_factor is not None,
+    )
     if stores and not program.strains_precede_step:
         recorder.strains([plate.step], [plate.time], run.displacement_field()[None])
     run.observe()
@@ -83,6 +95,8 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
     if impact is None or steps is None or not plate.step:
         return False
     if plate.dt != state.dt or plate.dt2 != state.dt * state.dt:
+        return False
+    if impact.start_w != 0.0:  # the kernels have a projectile that starts at 0
         return False
     count = min(run.interpreter.passes_to_come, run.interval - plate.step % run.interval)
     later = np.arange(count)
@@ -121,6 +135,8 @@ def central_difference(run: Simulation) -> None:
     # The loads belong to the state's own time, which TIME has advanced past.
     run.model.motion.central_difference(plate, state.dt, run.force_factor(state.load_clock))
     state.load_clock = state.clock
+    if state.impact is not None and run.model.impact is not None:
+        state.impact.plate_w = run.model.impact.deflection(plate)
     run.recorder.steps.step(plate, state.impact, run.force_factor())
     run.observe()
 

@@ -22,6 +22,7 @@ from fecm.problem.build import ImpactModel
 from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA
 from fecm.results.exposures import COARSENESS, LOAD_FACTOR
 from fecm.results.groups import STORED_BY
+from fecm.results.metrics import INITIAL_PLATE
 from fecm.results.schema import (
     CONTACT,
     CURE_STRESS,
@@ -53,6 +54,7 @@ SCALARS = (
     "contact_work",
     "displacement",
     "on_tape9",
+    "is_loaded_at_rest",
 )
 # Columns that follow from the motion of the projectile.
 PROJECTILE = ("velocity", "acceleration", "projectile_kinetic", "projectile_strain", "station")
@@ -72,7 +74,8 @@ class Damped(NamedTuple):
 class StepRecorder:
     """Recorder of every step in `buffers`. A plate without impact has energies and gages only.
 
-    `on_block` is called with the columns of each block and the initial energy.
+    `on_block` is called with the columns of each block and the energy before the first step,
+    without the energy of a static load that only holds the plate.
     """
 
     def __init__(
@@ -102,21 +105,29 @@ class StepRecorder:
         self._count = 0  # of these steps
         self._known = 0  # number of the steps with the projectile's columns
         self.initial = 0.0
+        self.initial_plate = 0.0  # part of the plate, of a static load
         self._damped = Damped()
 
     def begin(self, plate: PlateState, impact: ImpactState | None) -> None:
         """Store the energy before the first step (force*length)."""
-        self.initial = float(plate.strain_energy)
+        self.initial = self.initial_plate = float(plate.strain_energy)
         if self._impact is not None and impact is not None:
             self.initial += float(self._impact.rod.kinetic_energy(impact.rod.velocity[None])[0])
-        self._sink.attributes("energy", {"initial": self.initial})
+        of_plate = {INITIAL_PLATE: self.initial_plate} if self.initial_plate else {}
+        self._sink.attributes("energy", {"initial": self.initial, **of_plate})
 
     def step(
-        self, plate: PlateState, impact: ImpactState | None, factor: float, on_tape9: bool = False
+        self,
+        plate: PlateState,
+        impact: ImpactState | None,
+        factor: float,
+        on_tape9: bool = False,
+        is_loaded_at_rest: bool = False,
     ) -> None:
         """Add a row for the state after a step, with the load factor of the nodal forces.
 
-        Its contact is stored `on_tape9` if requested.
+        Its contact is stored `on_tape9` if requested. `is_loaded_at_rest` says that the nodal
+        forces only hold the deflection at which the impact started.
         """
         applied = None
         if self._impact is not None and impact is not None:
@@ -130,7 +141,7 @@ class StepRecorder:
             self._rod[self._count] = impact.rod.motion
             indentation, force = impact.contact
             row += [force, indentation, impact.plate_w, impact.contact_work, impact.rod.tip]
-            row.append(on_tape9)
+            row += [on_tape9, is_loaded_at_rest]
         self._table[: len(row), self._count] = row
         self._count += 1
         if self._count == BLOCK:
@@ -147,6 +158,7 @@ class StepRecorder:
         """
         work = np.full(len(sums), plate.external_work)
         columns_given = {**columns, "external_work": work, "on_tape9": on_tape9}
+        columns_given["is_loaded_at_rest"] = np.zeros(len(sums))
         values = np.vstack([*(columns_given[name] for name in NAMES), self._strains(sums).T])
         while values.size:
             self._add_projectile()
@@ -163,6 +175,7 @@ class StepRecorder:
         return {
             "rows": self._table[:, : self._count].copy(),
             "initial": self.initial,
+            "initial_plate": self.initial_plate,
             "damped": self._damped,
         }
 
@@ -171,6 +184,7 @@ class StepRecorder:
         self._count = self._known = state["rows"].shape[1]
         self._table[:, : self._count] = state["rows"]
         self.initial = state["initial"]
+        self.initial_plate = state["initial_plate"]
         self._damped = Damped(*state["damped"])
 
     def flush(self) -> None:
@@ -193,7 +207,8 @@ class StepRecorder:
         table["balance_error"] = table["held_energy"] - self.initial - table["external_work"]
         if self._motion.damping:
             self._add_damping(table)
-        self._on_block(table, self.initial)
+        at_rest = bool(table["is_loaded_at_rest"].all())
+        self._on_block(table, self.initial - self.initial_plate * at_rest)
         table["strain"] = columns[len(NAMES) :].T
         for buffer in self._buffers.values():
             buffer.put(table)

@@ -20,7 +20,7 @@ from fecm.problem.build import RunOptions
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem, Threshold
 from fecm.results.exposures import AT_REST, count_evaluations
-from fecm.results.metrics import MOBILITY, VALIDITY
+from fecm.results.metrics import INITIAL_PLATE, MOBILITY, REST_W, START_W, VALIDITY
 from fecm.results.result import Result
 from fecm.results.schema import KINEMATICS, Form, Kinematics, heading
 from fecm.results.sinks import ReadOnce, Sink
@@ -166,6 +166,10 @@ def _history_attributes(simulation: Simulation) -> dict[str, Any]:
         "permanent_indentation": system.law.permanent(impact.memory, impact.contact),
         "unsettled_steps": impact.unconverged_steps,
     }
+    if impact.start_w:
+        attributes[START_W] = impact.start_w
+        if simulation.state.rest_factor is not None:
+            attributes[REST_W] = impact.start_w
     if mobility := simulation.problem.judge.mobility:
         attributes[MOBILITY] = mobility
     return attributes
@@ -173,12 +177,12 @@ def _history_attributes(simulation: Simulation) -> dict[str, Any]:
 
 def _undoubted(simulation: Simulation, datasets: ReadOnce, history: dict[str, Any]) -> Result:
     """Return the result before it is judged, with what its metrics need."""
-    problem = simulation.problem
+    problem, steps = simulation.problem, simulation.recorder.steps
     groups: dict[str, dict[str, Any]] = {
         "": _units(problem.deck),
         "failure": {"modes": list(MODES)},
         "history": history,
-        "energy": {"initial": simulation.recorder.steps.initial},
+        "energy": {"initial": steps.initial, INITIAL_PLATE: steps.initial_plate},
     }
     if problem.threshold is not None:
         groups["threshold"] = {"force": problem.threshold.force}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecm._typing import Floats
+from fecm._typing import Bools, Floats
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.own_law import law_name
@@ -81,8 +81,9 @@ class Monitor:
 
         The error is relative to the energy supplied up to the end of the block, as a load has done
         almost no work in its first steps. The work of one step is not counted as an error: the work
-        belongs to the step, the energies to its end. Raises DivergenceError if the energy is not
-        finite, or if the error exceeds its limit.
+        belongs to the step, the energies to its end. A load that only holds the plate where the
+        impact started supplies no energy: its work changes the strain energy alone. Raises
+        DivergenceError if the energy is not finite, or if the error exceeds its limit.
         """
         lost = ~np.isfinite(block["held_energy"])
         if lost.any():
@@ -90,7 +91,7 @@ class Monitor:
             raise DivergenceError(step, "the motion is no longer finite")
         if threshold is not None:
             self._add_force(block, threshold)
-        self._add_work(block["external_work"])
+        self._add_work(block["external_work"], block["is_loaded_at_rest"] > 0.0)
         supplied = initial + self.largest_work
         if not supplied > 0.0:
             return
@@ -112,11 +113,12 @@ class Monitor:
         if len(above) and math.isnan(self.crossing):
             self.crossing = float(block["time"][above[0]])
 
-    def _add_work(self, work: Floats) -> None:
-        """Add the work of the nodal forces up to each step of a block."""
-        self.largest_work = max(self.largest_work, float(np.abs(work).max()))
-        jump = float(np.abs(np.diff(work, prepend=self.last_work)).max())
-        self.largest_jump = max(self.largest_jump, jump)
+    def _add_work(self, work: Floats, at_rest: Bools) -> None:
+        """Add the work of the nodal forces up to each step of a block; it may not count."""
+        counts = ~at_rest
+        self.largest_work = max(self.largest_work, float((counts * np.abs(work)).max()))
+        jump = counts * np.abs(np.diff(work, prepend=self.last_work))
+        self.largest_jump = max(self.largest_jump, float(jump.max()))
         self.last_work = float(work[-1])
 
 
@@ -138,6 +140,9 @@ class RunState:
     consistent_mass: bool = False  # whether CMAS came after LMAS
     factorised: bool = False  # whether TANG was carried out
     converged: bool = False  # whether the last SOLV met the tolerance
+    # Load factor under which the nodal forces have held the plate since the impact started; None if
+    # they do not hold it, or change.
+    rest_factor: float | None = None
     residual: Floats | None = None  # (neq,): load less internal force, formed by FORM
     # (numnp, 5): displacement about which TANG has formed the stiffness of a nonlinear plate
     linearised: Floats | None = None

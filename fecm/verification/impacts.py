@@ -21,6 +21,7 @@ from fecm.problem.loading import load_deck
 from fecm.problem.parts import build_plate
 from fecm.results.end import Deflection, LastContact, decided, ends, peak_known
 from fecm.results.result import Result
+from fecm.results.run_metrics import start_w_of
 from fecm.sweeps.execute import carry_out_plan
 from fecm.sweeps.job import checked_problem
 from fecm.sweeps.plan import plan
@@ -106,6 +107,22 @@ def _supported_plate() -> Sequence[Value]:
     result = decks.run_of_deck(decks.quarter_plate(8, plate, macros, further=hit))
     force, time = largest_force(result)
     return [4.0 * force, time, result.plate_w.max(), result.velocity[-1]]
+
+
+@case
+def _static_load() -> Sequence[Value]:
+    """Compare impacts on a quarter plate under a pressure, and without it."""
+    plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.03)
+    hit = (Projectile(0, 0, 5.0e-6 / 4.0), Impact(1, 3, V), decks.elastic(1.0e5 / 4.0))
+    steps = decks.impact_program(1.2e-7, 800)
+    loaded, unloaded = (
+        decks.run_of_deck(decks.quarter_plate(4, plate, macros, load, further=hit))
+        for load, macros in ((20.0, (*decks.program("TANG FORM SOLV"), *steps)), (0.0, steps))
+    )
+    start = start_w_of(loaded)
+    pairs = [(loaded[name], unloaded[name]) for name in ("force", "indentation", "velocity")]
+    pairs.append((loaded.plate_w - start, unloaded.plate_w))
+    return [float(np.abs(a - b).max() / np.abs(b).max()) for a, b in pairs]
 
 
 @case

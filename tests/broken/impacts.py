@@ -28,8 +28,10 @@ from tests.breaks import (
     instead,
     other_power,
     standing_plate,
+    started_at_zero,
     turned,
     value,
+    without_nodal_forces,
     work_of_the_new_force,
 )
 
@@ -96,6 +98,15 @@ BREAKS: Breaks = {
         instead(ImpactSystem, "__init__", standing_plate),
         {"infinite-plate": ("",), "supported-plate": ("largest force",),
          "report-impact": ("worst",)},
+    ),
+    "a projectile that starts at w = 0": (
+        in_numpy(instead(ImpactSystem, "advance", started_at_zero)),
+        {"static-load": ("difference of the force", "difference of the indentation",
+                         "difference of the velocity")},
+    ),
+    "nodal forces that the impact leaves out": (
+        instead(PlateMotion, "advance", without_nodal_forces),
+        {"static-load": ("difference",)},
     ),
     "action without equal reaction": (
         in_numpy(changed(ImpactSystem, "applied", lambda p: p._replace(force=1.01 * p.force))),

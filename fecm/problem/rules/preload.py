@@ -35,7 +35,8 @@ def preload_of_coupled_laminate(problem: Problem) -> Reports:
 
     Such a laminate bends under a force in its plane.
 
-    Remedy: A static solution under that force before the impact, with `NONL`.
+    Remedy: A static solution under that force before the impact, with `NONL`. The projectile then
+    starts on the bent plate.
     """
     card = problem.deck.last(model.Preload)
     if card is not None and any(card.forces) and problem.plate.is_coupled:
