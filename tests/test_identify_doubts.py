@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Literal
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.identification import IdentifyError, level, noise, onset, sign_runs
+from fecm.report import page_of
 from fecm.studies import StudyError, filter_of
 from tests.calls import call
 
@@ -190,7 +192,8 @@ def test_an_offset_is_fitted_or_proposed() -> None:
     found_inside(force, ["offset"], errors=3.0)
     with pytest.warns(fecm.FecmWarning, match=r"fit offset too: with offset 5\d\.\d N the rms"):
         found = fecm.identify(doubted(), LONG, force, ["k", "mass", "velocity"])
-    assert not found.accepted
+    assert (found.accepted, found.verdict) == (False, "no")
+    assert found.doubts[0] == found.notes[0]
 
 
 def test_an_offset_shows_before_the_contact_though_the_model_is_wrong() -> None:
@@ -213,12 +216,26 @@ def test_delay_and_offset_are_fitted_together() -> None:
     found_inside(recorded(BASE, LATE), ["delay", "offset"], errors=3.0)
 
 
+def test_a_fit_with_a_doubt_says_so_in_table_json_and_page() -> None:
+    fit = fecm.identify(doubted(), LONG, recorded(), ["k", "mass", "velocity"])
+    doubted_fit = replace(fit, notes=("a reason",), doubts=("a reason",))
+    assert doubted_fit.verdict == doubted_fit.to_dict()["verdict"] == "with doubts"
+    assert "accepted     with doubts" in str(doubted_fit)
+    page = page_of({"measured": doubted_fit})
+    assert page.verdict[-1] == "The fit is accepted with doubts: see Trust."
+    assert page.level.value == "doubtful"
+
+
 def test_points_of_the_contact_beyond_the_run_are_refused_and_others_are_not() -> None:
     longer = np.linspace(0.0, 3e-2, 10000)
     time, force = _heavy_force()
     force = np.interp(longer, time, force, right=0.0)
     with pytest.warns(fecm.FecmWarning, match="9000 of 10000 points are outside"):
-        assert fecm.identify(doubted(), longer, force, ["k", "mass", "velocity"]).accepted
+        found = fecm.identify(doubted(), longer, force, ["k", "mass", "velocity"])
+    assert "9000 of 10000 points are outside the run of the deck and left out" in found.notes
+    # The contact is inside the run: the points left out are a remark and no reason to doubt.
+    assert not any("outside" in doubt for doubt in found.doubts)
+    assert found.verdict == ("with doubts" if found.doubts else "yes")
     short = HUMPS < 1.7e-4
     deck = started().with_(duration=1.2e-4)
     with pytest.raises(StudyError, match="more than 20 % of the points of the contact"):

@@ -65,10 +65,10 @@ def test_energy_and_velocity_take_a_unit(options: tuple[str, ...], velocity: flo
 
 def test_plies_thickness_and_stress_of_a_preload_are_said() -> None:
     # A layup that is symmetric and gets an s again has twice the plies.
-    made = new(*PLATE, "--layup", "[0/90/90/0]2s", *QUICK, "--velocity", "3", "--preload=-8,0")
+    made = new(*PLATE, "--layup", "[0/90/90/0]2s", *QUICK, "--velocity", "3", "--preload", "8,0")
     h = fecm.read_one(made.stdout).require(Material).integration.thickness
     assert f"the laminate [0/90/90/0]2s has 16 plies and is {h:.4g} mm thick" in made.stderr
-    assert f"the preload -8 N/mm is a mean stress of {-8.0 / h:.4g} N/mm^2" in made.stderr
+    assert f"the preload 8 N/mm is a mean stress of {8.0 / h:.4g} N/mm^2" in made.stderr
 
 
 def test_a_duration_takes_a_unit() -> None:

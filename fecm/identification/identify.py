@@ -68,6 +68,7 @@ from fecm.sweeps.plan import check_law, shares_plate
 
 FREE = (*CARDS, *OF_RECORD)
 USUAL_EVALUATIONS = 30  # of a fit, each with one force more than there are parameters
+MANY_LOST = 0.05  # share of the contact's points outside the run that makes a doubt of a remark
 CORRELATED = 0.99  # correlation of two parameters above which a note reports it
 UNIT_OFFSET = 0.01  # unit of the offset, over the peak of the deck's run
 
@@ -366,11 +367,10 @@ def fit_deck(
     except IdentifyError as error:
         raise IdentifyError(f"{fault}; besides, {error}" if fault else str(error)) from None
     identification = _identification(model, measured, points, cov, fault)
-    return (
-        replace(identification, notes=(*identification.notes, suspicion))
-        if suspicion
-        else identification
-    )
+    if not suspicion:
+        return identification
+    notes, doubts = identification.notes, identification.doubts
+    return replace(identification, notes=(*notes, suspicion), doubts=(*doubts, suspicion))
 
 
 def _identification(
@@ -403,8 +403,12 @@ def _identification(
         notes=(),
         law="" if model.law is None else law_name(model.law),
     )
-    notes = filter(None, (fault, *_notes(identification, points, measured, model)))
-    return replace(identification, notes=tuple(notes))
+    doubts = tuple(filter(None, (fault, *_doubts(identification, points, model))))
+    remark = _points_left_out(identification, measured)
+    if remark and points.lost > MANY_LOST:
+        doubts = (remark, *doubts)
+    notes = doubts if not remark or remark in doubts else (*doubts, remark)
+    return replace(identification, notes=notes, doubts=doubts)
 
 
 def _rank(points: FittedPoints | None) -> tuple[bool, float]:
@@ -447,15 +451,18 @@ def _start(deck: Deck, name: str) -> float:
     return float(getattr(rod, name.removeprefix("rod_")))
 
 
-def _notes(
-    fit: Identification, solution: FittedPoints, measured: Measurement, model: ForceModel
-) -> Iterator[str]:
+def _points_left_out(fit: Identification, measured: Measurement) -> str:
+    """Return a remark about points outside the run of the deck; empty if there are none."""
+    count = len(measured.time)
+    if not (outside := count - len(fit.time)):
+        return ""
+    return f"{outside} of {count} points are outside the run of the deck and left out"
+
+
+def _doubts(fit: Identification, solution: FittedPoints, model: ForceModel) -> Iterator[str]:
     """Yield reasons to doubt the values, from the fit and from the run of the fitted deck."""
     if not fit.converged:
         yield "the fit has not converged; start from better values in the deck"
-    if outside := len(measured.time) - len(fit.time):
-        count = len(measured.time)
-        yield f"{outside} of {count} points are outside the run of the deck and left out"
     for name, bound in zip(fit.values, solution.active, strict=True):
         if bound:
             yield f"{name} is at its bound {fit.values[name]:.6g}; its standard error is void"

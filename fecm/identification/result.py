@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -52,7 +53,9 @@ class Identification:
     deck : Deck
         The deck with the fitted values, rounded to five digits.
     notes : tuple of str
-        Reasons to doubt the values.
+        Reasons to doubt the values, and remarks.
+    doubts : tuple of str
+        The notes that are reasons to doubt the values.
     law : str
         Name of the contact law that replaced EXPE; empty if none did. The deck has EXPE all the
         same.
@@ -70,7 +73,15 @@ class Identification:
     plate_errors: dict[str, dict[str, float]]
     deck: Deck
     notes: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
     law: str = ""
+
+    @property
+    def verdict(self) -> Literal["yes", "with doubts", "no"]:
+        """Whether the values are accepted: yes, with doubts (see `doubts`), or no."""
+        if not self.accepted:
+            return "no"
+        return "with doubts" if self.doubts else "yes"
 
     @property
     def residual(self) -> Floats:
@@ -160,6 +171,7 @@ class Identification:
             "share": self.share,
             "converged": self.converged,
             "accepted": self.accepted,
+            "verdict": self.verdict,
             "plate_errors": self.plate_errors,
             "notes": list(self.notes),
             "cards": self.cards(),
@@ -170,8 +182,7 @@ class Identification:
         return "\n\n".join([*tables, self.cards()])
 
     def __repr__(self) -> str:
-        verdict = "accepted" if self.accepted else "not accepted"
-        return f"<fecm identification of {', '.join(self.values)}: {verdict}>"
+        return f"<fecm identification of {', '.join(self.values)}: accepted {self.verdict}>"
 
     def _repr_html_(self) -> str:
         """Return tables of the fit and its notes, for notebooks."""
@@ -202,7 +213,7 @@ def _quality(fit: Identification) -> Table:
         ("points", f"{len(fit.time)}, {fit.dof} degrees of freedom"),
         ("residual", f"{rms} rms, {100.0 * fit.share:.2g} % of the peak"),
         ("converged", "yes" if fit.converged else "no"),
-        ("accepted", "yes" if fit.accepted else "no"),
+        ("accepted", fit.verdict),
     ]
     if fit.law:
         rows.append(("law", f"{fit.law}, instead of EXPE"))

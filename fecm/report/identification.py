@@ -26,20 +26,19 @@ from fecm.report.content import (
 )
 from fecm.report.figures import inside
 
+VERDICTS = {
+    "yes": (TrustLevel.WITHIN, "The fit is accepted: it describes the measurement."),
+    "with doubts": (TrustLevel.DOUBTFUL, "The fit is accepted with doubts: see Trust."),
+    "no": (TrustLevel.OUTSIDE, "The fit is not accepted: see Trust."),
+}
+
 
 def identification_page(name: str, fit: Identification) -> ReportPage:
     """Return the page about a fit. `name` is the name of the measurement."""
     values = ", ".join(_format_parameter(fit, key) for key in fit.values)
     verdict = [f"Fitted to {name}: {values}."]
-    level = TrustLevel.WITHIN
-    if not fit.accepted:
-        level = TrustLevel.OUTSIDE
-        verdict.append("The fit is not accepted: see Trust.")
-    elif fit.notes:
-        level = TrustLevel.DOUBTFUL
-        verdict.append("The fit has converged, with doubts: see Trust.")
-    else:
-        verdict.append("The fit has converged and describes the measurement.")
+    level, sentence = VERDICTS[fit.verdict]
+    verdict.append(sentence)
     _, *results = identification_tables(fit)  # the first is judged under Trust
     body = sections(
         [
@@ -62,10 +61,9 @@ def _format_parameter(fit: Identification, name: str) -> str:
 
 def _judgements(fit: Identification) -> Iterator[Judgement]:
     """Judge convergence and residual."""
-    for name, fine in (("converged", fit.converged), ("accepted", fit.accepted)):
-        yield Judgement(
-            TrustLevel.WITHIN if fine else TrustLevel.OUTSIDE, name, "yes" if fine else "no"
-        )
+    level = TrustLevel.WITHIN if fit.converged else TrustLevel.OUTSIDE
+    yield Judgement(level, "converged", "yes" if fit.converged else "no")
+    yield Judgement(VERDICTS[fit.verdict][0], "accepted", fit.verdict)
     force = unit_of("force", unit_names(fit.deck))
     yield Judgement(
         TrustLevel.UNJUDGED, "residual, rms", number_with_unit(fit.rms, force), "noise and model"

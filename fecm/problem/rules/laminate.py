@@ -59,7 +59,7 @@ def unknown_order(material: model.Material) -> Reports:
     for name, order in (("bending order L1", card.bending), ("shear order L2", card.shear)):
         if not 1 <= order <= HIGHEST_ORDER:
             used = min(HIGHEST_ORDER, max(1, order))
-            message = f"The {name} is {order} ; {used} is used instead."
+            message = f"The {name} is {order}; {used} is used instead."
             yield Report(message, card.place(name))
 
 
