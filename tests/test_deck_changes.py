@@ -273,7 +273,9 @@ def test_a_program_stores_what_it_is_asked_for_within_the_loop_that_takes_steps(
         ("RODP", 9, 0), ("DISP", 9, 0), ("FAIL", 7, 0), ("PLYS", 50, 4), ("NEXT", 0, 0),
     ]  # fmt: skip
     (word, value, _) = program(deck.with_program(plies=True))[-2]
-    assert (word, value) == ("PLYS", steps // 20)
+    assert (word, value) == ("PLYS", steps // 20)  # DISP is at every 20th step
+    (word, value, _) = program(deck.with_program(plies=True, every=9))[-2]
+    assert (word, value) == ("PLYS", 198)
     assert deck.with_program(plies=True, failure=True).with_program(
         plies=False, failure=False
     ) == dataclasses.replace(deck, text="")

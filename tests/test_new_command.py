@@ -607,3 +607,12 @@ def test_a_unit_where_a_number_is_needed_is_named(option: tuple[str, str]) -> No
     assert_unusable(made)
     number = option[1].partition(":")[2] or option[1]
     assert f"{number!r} has a unit; give the number alone, in the deck's units" in made.stderr
+
+
+@pytest.mark.parametrize("every", [(), ("--every", "7"), ("--every", "300")])
+def test_rows_of_ply_stresses_have_displacements_for_paraview(every: tuple[str, ...]) -> None:
+    deck = new_deck(*D7136, "--energy", "10J", "--damage", *every, *QUICK)
+    numbers = {macro.word: macro.value for macro in deck.macros}
+    assert numbers["PLYS"] % numbers["DISP"] == 0
+    rows = numbers["LOOP"] // numbers["PLYS"]
+    assert 20 <= rows <= 22 or numbers["PLYS"] == numbers["DISP"]

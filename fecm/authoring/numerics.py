@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 from fecm.authoring.contact import parse_patch
 from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck import model
-from fecm.deck.macros import PLY_ROWS, Rows, RowsOfPlies, with_outputs
+from fecm.deck.macros import Rows, RowsOfPlies, steps_of_plies, with_outputs
 from fecm.deck.model import Allowables, Deck, Macro, Patch, Shear
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.points import HERTZ
@@ -90,14 +90,14 @@ class Numerics(NamedTuple):
         By default it stores ply stresses in `elements` elements; None stores no ply stresses.
         """
         steps = max(1, math.ceil(duration / dt - 1e-9))
-        rows = float(self.every if self.every is not None else max(1, steps // ROWS))
+        rows = self.every if self.every is not None else max(1, steps // ROWS)
         words = {"LMAS": 0.0, "DT": dt, "LOOP": float(steps), "TIME": 0.0}
-        words |= {"RODP": rows, "DISP": rows, "NEXT": 0.0}
+        words |= {"RODP": float(rows), "DISP": float(rows), "NEXT": 0.0}
         macros = [Macro(word, value=value) for word, value in words.items()]
         failure = deck.has(Allowables) if self.failure is None else self.failure
         plies = self.plies
         if plies is None and elements is not None:
-            plies = (max(1, steps // PLY_ROWS), elements)
+            plies = (steps_of_plies(steps, rows), elements)
         return with_outputs(macros, failure=failure, plies=plies)
 
     def with_program(self, deck: Deck, dt: float, duration: float | None) -> Deck:

@@ -373,12 +373,28 @@ HISTORY = "RODP"
 FIELDS = "DISP"
 PLIES = "PLYS"
 FAILURE = "FAIL"
-PLY_ROWS = 20  # default number of rows of ply stresses; few, because a row is large
+PLY_ROWS = 20  # least default number of rows of ply stresses; few, because a row is large
+# Macro whose steps a new macro follows.
+FOLLOWS = {PLIES: FIELDS, FAILURE: HISTORY}
 
 # Steps between stored rows: a number, True for a default, False for no rows.
 Rows = int | bool
 # `Rows`, or the steps between rows and the number of elements nearest to the load.
 RowsOfPlies = Rows | tuple[int, int]
+
+
+def steps_of_plies(passes: int, fields: int) -> int:
+    """Return the default number of PLYS in a loop of `passes` passes with this number of DISP.
+
+    It is a multiple of the number of DISP, so that each row of ply stresses has displacements.
+
+    Examples
+    --------
+    >>> steps_of_plies(25295, 126)
+    1260
+    """
+    steps = max(1, passes // PLY_ROWS)
+    return steps // fields * fields or min(fields, passes)
 
 
 class RowsError(FecmError, ValueError):
@@ -399,8 +415,11 @@ class _Output(NamedTuple):
         return replace(macro, value=value, second=second, source=None)
 
     def create(self, passes: int, step: int) -> Macro:
-        """Return a macro for a loop of `passes` passes in which RODP stores every `step` steps."""
-        default = max(1, passes // PLY_ROWS) if self.word == PLIES else min(step, passes)
+        """Return a macro for a loop of `passes` passes.
+
+        The macro that it follows stores every `step` steps.
+        """
+        default = steps_of_plies(passes, step) if self.word == PLIES else min(step, passes)
         value = default if self.rows is True else self.rows
         return Macro(self.word, value=float(value), second=float(self.nearest or 0))
 
@@ -417,8 +436,8 @@ def with_outputs(
     `every` is the number of RODP and DISP, `plies` the number of PLYS, and `failure` the number of
     FAIL. A missing PLYS or FAIL is added at the end of each loop that takes steps, or at the end of
     a program without such a loop. True keeps the number of an existing macro. A new FAIL then has
-    the number of RODP, and a new PLYS stores about :data:`PLY_ROWS` rows. Raises RowsError if a
-    number is not positive and whole.
+    the number of RODP, and a new PLYS that of :func:`steps_of_plies`. Raises RowsError if a number
+    is not positive and whole.
     """
     changed = list(macros)
     if every is not None:
@@ -462,7 +481,7 @@ def _with_output(macros: Sequence[Macro], output: _Output) -> list[Macro]:
         return [macro for macro in macros if macro.word != output.word]
     if any(macro.word == output.word for macro in macros):
         return [output.update(m) if m.word == output.word else m for m in macros]
-    step = next((every(macro) for macro in macros if macro.word == HISTORY), 1)
+    step = next((every(macro) for macro in macros if macro.word == FOLLOWS[output.word]), 1)
     changed: list[Macro] = []
     loops: list[int] = []  # passes of the open loops
     stepping: set[int] = set()  # depths of open loops that take steps

@@ -46,6 +46,7 @@ def vtk_cells(elements: Array) -> tuple[Ints, Ints, Ints]:
 
 
 Note = Callable[[str], None]
+SHARE = "The number of their macro should be a multiple of the number of DISP"
 # Numbers of points that are the first nodes of an element (K = -2: corners, K = -3: nine).
 NODAL_POINTS = (4, 9)
 
@@ -143,11 +144,20 @@ def _rows_of(
     stored_steps = stored[f"{group}/step"]
     nearest = np.minimum(np.searchsorted(stored_steps, steps), len(stored_steps) - 1)
     shared = stored_steps[nearest] == steps
+    without = int((~np.isin(stored_steps, stored["tape3/step"])).sum())
     if not shared.any():
-        note(f"{what} ({group}) and displacements (tape3) share no step; {what} are omitted")
-    elif not shared.all():
+        note(
+            f"{what} ({group}) and displacements (tape3) share no step; {what} are omitted. {SHARE}"
+        )
+        return nearest, shared
+    if not shared.all():
         were = f"were stored at {shared.sum()} of {len(steps)} time steps"
         note(f"{what} ({group}) {were}; at the others they are NaN")
+    if without:
+        note(
+            f"{without} of {len(stored_steps)} rows of {what} ({group}) have no displacements "
+            f"(tape3) at their step and are omitted. {SHARE}"
+        )
     return nearest, shared
 
 
