@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import fecm
 from fecm import Result
+from fecm._table import Table
 from fecm.deck import layup_text, parse_layup
 from fecm.report import page_of, render
 from fecm.results import ALL_CRITERIA, METRICS, first_failures
@@ -92,6 +93,16 @@ def test_a_reader_of_the_page_alone_learns_what_happened(failed: Result, shown: 
     ):
         assert said.lower() in text.lower(), said
     assert all(note in text for note in failed.notes)
+
+
+def test_verdict_and_table_of_a_page_name_one_ply_for_the_first_failure(failed: Result) -> None:
+    made = page_of({"failed": failed})
+    (results,) = (section for section in made.sections if section.title == "Results")
+    tables = {table.title: table for table in results.blocks if isinstance(table, Table)}
+    earliest, *_ = tables["First failure by criterion"].rows
+    criterion, mode, where = map(str, earliest[:3])
+    assert f"first failure: {mode} ({criterion}), {where}, at" in made.verdict[0]
+    assert "1 at time" not in tables["Largest exposures"].header
 
 
 def test_exposures_of_a_page_are_those_of_the_result(failed: Result, shown: Page) -> None:

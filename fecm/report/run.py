@@ -321,27 +321,45 @@ def _threshold(result: Result) -> list[PageBlock]:
 
 
 def _criteria(result: Result) -> list[PageBlock]:
-    """Return a table of the largest exposure and the first failure of every criterion."""
-    length, time, force = (unit_of(name, result.units) for name in ("length", "time", "force"))
-    first = {exposure.criterion: exposure for exposure in first_failures(result)}
-    rows: list[Row] = []
-    for exposure in largest_exposures(result):
-        reached = first.get(exposure.criterion)
-        rows.append(
-            (
-                spelt(exposure.criterion),
-                number_with_unit(exposure.exposure),
-                exposure.mode,
-                exposure.where,
-                number_with_unit(exposure.x, length),
-                number_with_unit(exposure.y, length),
-                number_with_unit(exposure.time, time),
-                UNKNOWN if reached is None else number_with_unit(reached.time, time),
-                UNKNOWN if reached is None else number_with_unit(reached.force, force, 4),
-            )
+    """Return tables of the largest exposures and of the first failures, by criterion.
+
+    The two may be in different plies: an exposure goes on to grow after it has reached 1.
+    """
+    length, time, force, energy = (
+        unit_of(name, result.units) for name in ("length", "time", "force", "force*length")
+    )
+    largest: list[Row] = [
+        (
+            spelt(exposure.criterion),
+            number_with_unit(exposure.exposure),
+            exposure.mode,
+            exposure.where,
+            number_with_unit(exposure.x, length),
+            number_with_unit(exposure.y, length),
+            number_with_unit(exposure.time, time),
         )
-    header = ("criterion", "exposure", "mode", "where", "x", "y", "time")
-    return page_table(rows, (*header, "1 at time", "1 at force"), "Largest exposures")
+        for exposure in largest_exposures(result)
+    ]
+    first: list[Row] = [
+        (
+            spelt(failure.criterion),
+            failure.mode,
+            failure.where,
+            number_with_unit(failure.x, length),
+            number_with_unit(failure.y, length),
+            number_with_unit(failure.time, time),
+            number_with_unit(failure.force, force),
+            number_with_unit(failure.energy, energy),
+        )
+        for failure in first_failures(result)
+    ]
+    place = ("mode", "where", "x", "y", "time")
+    return [
+        *page_table(largest, ("criterion", "exposure", *place), "Largest exposures"),
+        *page_table(
+            first, ("criterion", *place, "force", "given up by then"), "First failure by criterion"
+        ),
+    ]
 
 
 def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> Iterator[PageBlock]:
