@@ -35,15 +35,16 @@ class StudyError(FecmError, ValueError):
     """A study can't be computed from these numbers, or their table is invalid."""
 
 
-def did_you_mean(name: str, known_names: Iterable[str]) -> str:
+def did_you_mean(name: str, known_names: Iterable[str], similarity: float = 0.6) -> str:
     """Return the end of a message about an unknown name: the most similar known name.
 
-    It is empty if no name is similar. Upper and lower case are alike.
+    It is empty if no name is similar. Upper and lower case are alike. `similarity` is the least
+    one, from 0 to 1.
     """
     import difflib  # 1 ms, only after a mistake
 
     folded = {name_known.casefold(): name_known for name_known in known_names}
-    close = difflib.get_close_matches(name.casefold(), folded, n=1)
+    close = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=similarity)
     return f"; did you mean {folded[close[0]]}?" if close else ""
 
 

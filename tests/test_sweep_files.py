@@ -15,6 +15,7 @@ import pytest
 
 import fecm
 from fecm import SweepResult
+from fecm.authoring import CasesError
 from fecm.sweeps import sweep_summary
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM
@@ -258,3 +259,79 @@ def test_a_history_streamed_from_stored_tasks_is_the_one_in_memory(tmp_path: Pat
     )
     assert done.exit_code == 0
     assert (tmp_path / "stream.h5").read_bytes() == (tmp_path / "memory.h5").read_bytes()
+
+
+MEASURED_TESTS = (
+    "Energy (J);Fmax/kN;specimen;dent [mm];n;Temp (°C)\n"
+    "0,01;0,62;A1;0,1;3;20\n0,02;0,95;A2;;3;21,5\n"
+)
+
+
+def in_millimetres() -> str:
+    return small().replace("COOR\n", "UNIT\nmm N s\nCOOR\n", 1)
+
+
+def test_columns_that_are_not_varied_stand_beside_the_results_everywhere(tmp_path: Path) -> None:
+    table, path = tmp_path / "tests.csv", tmp_path / "s.h5"
+    table.write_text(MEASURED_TESTS, encoding="utf-8")
+    result = fecm.sweep(in_millimetres(), cases=table, output=path)
+    assert result.cases["energy"].tolist() == pytest.approx([10.0, 20.0])
+    for read in (result, fecm.load_sweep(path)):
+        assert read["measured_Fmax"].tolist() == [620.0, 950.0]  # in N
+        assert read["measured_specimen"].tolist() == ["A1", "A2"]
+        np.testing.assert_array_equal(read["measured_dent"], [0.1, np.nan])
+        assert read["measured_Temp"].tolist() == [20.0, 21.5]
+        assert [read.unit(f"measured_{name}") for name in ("Fmax", "dent", "n", "Temp")] == [
+            "N",
+            "mm",
+            "",
+            "°C",
+        ]
+    text = call("export", path, "--to", "csv", "-o", "-").stdout
+    row = next(csv.DictReader(io.StringIO(text)))
+    measured = {name: value for name, value in row.items() if name.startswith("measured_")}
+    assert measured == {
+        "measured_Fmax (N)": "620.0",
+        "measured_specimen": "A1",
+        "measured_dent (mm)": "0.1",
+        "measured_n": "3.0",
+        "measured_Temp (°C)": "20.0",
+    }
+    assert "measured_specimen, which are not varied" in call("info", path).stdout
+
+
+def test_measured_columns_of_python_are_those_of_a_file(tmp_path: Path) -> None:
+    table = tmp_path / "tests.csv"
+    table.write_text(MEASURED_TESTS, encoding="utf-8")
+    deck = in_millimetres()
+    rows = [
+        {"Energy (J)": 0.01, "Fmax/kN": 0.62, "specimen": "A1", "dent [mm]": 0.1},
+        {"Energy (J)": 0.02, "Fmax/kN": 0.95, "specimen": "A2", "dent [mm]": None},
+    ]
+    of_file, of_python = fecm.sweep(deck, cases=table), fecm.sweep(deck, cases=rows)
+    assert of_python["energy"].tolist() == of_file["energy"].tolist()
+    for name, column in of_python.measured.items():
+        np.testing.assert_array_equal(column, of_file[name])
+        assert of_python.unit(name) == of_file.unit(name)
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("velocity,energi", "`energi` cannot be varied; did you mean energy"),
+        ("velocity,Energie", "did you mean energy[?] .*`measured Energie`"),
+        ("velocity,ply thickness", "did you mean ply_thickness"),
+        ("velocity,Velocity", "column velocity is repeated"),
+        ("Fmax,n", "`Fmax` cannot be varied"),
+    ],
+)
+def test_a_misspelt_value_is_not_taken_for_a_measured_column(
+    tmp_path: Path, header: str, message: str
+) -> None:
+    table = tmp_path / "tests.csv"
+    table.write_text(f"{header}\n1,2\n")
+    with pytest.raises(CasesError, match=message):
+        fecm.sweep(fecm.examples.path("impact-patch"), cases=table)
+    names = header.split(",")
+    with pytest.raises(CasesError, match=message):
+        fecm.sweep(fecm.examples.path("impact-patch"), cases=[dict.fromkeys(names, 1.0)])

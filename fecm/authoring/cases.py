@@ -9,14 +9,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from types import MappingProxyType
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fecm._errors import StudyError
-from fecm._measured_tables import read_table
+from fecm._errors import StudyError, did_you_mean
+from fecm._measured_tables import MeasuredTable, column_head, plain_unit, read_table
 from fecm.authoring.case import MOST_CASES, Case, CasesError, Value, check_count, number_of_text
+from fecm.authoring.parameters import is_number, text_of
 from fecm.authoring.values import (
+    NAMES,
     ValueKind,
     check_free,
     check_known,
@@ -26,11 +30,32 @@ from fecm.authoring.values import (
     value_of,
     without_unit,
 )
+from fecm.deck.units import MASS, VELOCITY, in_si, unit_in_si, unit_of, units_of
+
+MEASURED = "measured_"  # before the names of measured columns
+MISSPELT = 0.75  # similarity to the name of a value from which a column is taken as misspelt
+# Dimensions of measured columns that are converted.
+CONVERTED = ("force", "length", "time", "force*length", VELOCITY, MASS)
 
 
-def cases_of(
+class MeasuredColumn(NamedTuple):
+    """Column of a table of cases that is not varied, such as a measured peak force."""
+
+    values: NDArray[Any]  # (cases,): numbers, NaN in empty fields, or texts
+    unit: str  # that of the deck if the column could be converted; empty if it is unknown
+    dimension: str  # empty if the unit is not converted
+
+
+class TableOfCases(NamedTuple):
+    """Cases, and the measured columns of their table by name."""
+
+    cases: list[Case]
+    measured: Mapping[str, MeasuredColumn] = MappingProxyType({})
+
+
+def table_of_cases(
     vary: object, cases: object, *, free: bool = False, system: str | None = None
-) -> list[Case]:
+) -> TableOfCases:
     """Return the cases of a table, or every combination of varied values.
 
     `cases` is the path of a CSV file, a mapping for each case, or a DataFrame. Without it, `vary`
@@ -38,12 +63,13 @@ def cases_of(
     :func:`checked`. Raises CasesError if a name or a value is invalid.
     """
     if isinstance(cases, str | Path):
-        return read_cases(Path(cases), system)
+        return _table_of_file(Path(cases), system)
     if cases is not None:
-        return checked(cases, free=free, system=system)
+        rows, measured = (cases, {}) if free else _without_measured(cases, system)
+        return TableOfCases(checked(rows, free=free, system=system), measured)
     if texts := texts_of(vary):
-        return grid_cases([parse_vary(text, system) for text in texts])
-    return combined(vary or {}, free=free, system=system)
+        return TableOfCases(grid_cases([parse_vary(text, system) for text in texts]))
+    return TableOfCases(combined(vary or {}, free=free, system=system))
 
 
 def texts_of(texts: object) -> list[str]:
@@ -59,8 +85,14 @@ def read_cases(path: Path, system: str | None = None) -> list[Case]:
     """Read a CSV table: a header of names and one row per case.
 
     A value, or the header of its column, may have a unit. Such values are converted to the given
-    system of units. Raises CasesError with the line of an error.
+    system of units. Names are not case-sensitive. Columns that can't be varied are measured values.
+    Raises CasesError with the line of an error.
     """
+    return _table_of_file(path, system).cases
+
+
+def _table_of_file(path: Path, system: str | None) -> TableOfCases:
+    """Read the cases and the measured columns of a file; see :func:`read_cases`."""
     try:
         table = read_table(path, MOST_CASES + 1)
     except StudyError as error:
@@ -68,8 +100,8 @@ def read_cases(path: Path, system: str | None = None) -> list[Case]:
     if not (table.head[1] and table.rows):
         raise CasesError(f"{path}: a table of cases has a header of names and at least one row")
     (number, _), header = table.head, table.names
+    variables = _variables(header, f"{path}:{number}")
     for name in header:
-        check_known(name, f"{path}:{number}")
         if header.count(name) > 1:
             raise CasesError(f"{path}:{number}: column {name} is repeated")
     try:
@@ -79,19 +111,134 @@ def read_cases(path: Path, system: str | None = None) -> list[Case]:
         raise CasesError(str(error)) from None
     cases: list[Case] = []
     for line, row in table.rows:
-        if len(row) != len(header):
+        if len(row) > len(header) or len(row) <= max(map(header.index, variables)):
             raise CasesError(f"{path}:{line}: {len(row)} values, but {len(header)} names")
         try:
-            case = {}
-            for name, text, unit in zip(header, row, table.units, strict=True):
-                if name == "layup" and table.is_decimal_comma:
-                    text = re.sub("(?<=[0-9]),(?=[0-9])", ".", text)
-                case[name] = parse_value(name, text + unit, system)
-            cases.append(case)
+            cases.append(_case(table, row, variables, system))
         except CasesError as error:
             raise CasesError(f"{path}:{line}: {error}") from None
     check_count(len(cases), f"{path} has {len(cases)} cases")
-    return cases
+    measured = {
+        measured_name(name): _measured_column(
+            [row[place] if place < len(row) else "" for _, row in table.rows], unit, system
+        )
+        for place, (name, unit) in enumerate(zip(header, table.units, strict=False))
+        if name not in variables
+    }
+    return TableOfCases(cases, measured)
+
+
+def _case(
+    table: MeasuredTable, row: Sequence[str], variables: Mapping[str, str], system: str | None
+) -> Case:
+    """Return the case of a row; raise CasesError if a value is invalid."""
+    case = {}
+    for name, text, unit in zip(table.names, row, table.units, strict=False):
+        if (variable := variables.get(name)) is None:
+            continue
+        if variable == "layup" and table.is_decimal_comma:
+            text = re.sub("(?<=[0-9]),(?=[0-9])", ".", text)
+        case[variable] = parse_value(variable, text + unit, system)
+    return case
+
+
+def _variables(names: Sequence[str], where: str) -> dict[str, str]:
+    """Return the columns that are varied, and the names of what they vary.
+
+    Capitals do not matter. Raises CasesError if no column can be varied, or a name looks like a
+    misspelt one.
+    """
+    variables = {}
+    for name in names:
+        alike = [known for known in NAMES if known.casefold() == name.casefold()]
+        if name in NAMES or len(alike) == 1:
+            variables[name] = name if name in NAMES else alike[0]
+        elif not name.casefold().startswith("measured") and (
+            known := did_you_mean(name, NAMES, MISSPELT)
+        ):
+            raise CasesError(
+                f"{where}: `{name}` cannot be varied{known} A measured column of this name is "
+                f"`measured {name}`"
+            )
+    if not variables:
+        check_known(names[0], where)
+    for known in variables.values():
+        if [*variables.values()].count(known) > 1:
+            raise CasesError(f"{where}: column {known} is repeated")
+    return variables
+
+
+def measured_name(name: str) -> str:
+    """Return the name of a measured column in results, with ``_`` for other marks.
+
+    >>> measured_name("Fmax"), measured_name("measured dent (after 48 h)")
+    ('measured_Fmax', 'measured_dent_after_48_h')
+    """
+    plain = re.sub(r"\W+", "_", name).strip("_")
+    return MEASURED + re.sub("^measured_*", "", plain, flags=re.IGNORECASE)
+
+
+def _measured_column(values: Sequence[object], unit: str, system: str | None) -> MeasuredColumn:
+    """Return a measured column, converted to a system of units if its unit is known."""
+    numbers = [_measured_number(value) for value in values]
+    if any(number is None for number in numbers):
+        return MeasuredColumn(np.array([str(value) for value in values]), unit, "")
+    column = np.array(numbers, float)
+    names = units_of(system) if system else {}
+    for dimension in CONVERTED if names else ():
+        size, one = unit_in_si(plain_unit(unit), dimension), in_si(dimension, names)
+        if size is not None and one is not None:
+            return MeasuredColumn(column * (size / one), unit_of(dimension, names), dimension)
+    return MeasuredColumn(column, unit, "")
+
+
+def _measured_number(value: object) -> float | None:
+    """Return a number, NaN for an empty field, and None for other texts."""
+    if value is None or (isinstance(value, str) and value.strip() in ("", "-")):
+        return math.nan
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return None
+
+
+def _without_measured(
+    cases: object, system: str | None
+) -> tuple[object, dict[str, MeasuredColumn]]:
+    """Return the cases of Python without their measured columns, and these columns.
+
+    Cases that are not a table of mappings are returned as they are.
+    """
+    rows = _rows(cases) if isinstance(cases, CaseTable) else cases
+    if not isinstance(rows, Iterable):
+        return cases, {}
+    rows = list(rows)
+    if not rows or any(
+        not isinstance(row, Mapping) or row.keys() != rows[0].keys() for row in rows
+    ):
+        return rows, {}
+    heads = {name: column_head(str(name)) for name in rows[0]}
+    variables = _variables([head.name for head in heads.values()], "case 0") if heads else {}
+    kept = [
+        {
+            variables[head.name]: _with_unit(row[name], head.unit)
+            for name, head in heads.items()
+            if head.name in variables
+        }
+        for row in rows
+    ]
+    measured = {
+        measured_name(head.name): _measured_column([row[name] for row in rows], head.unit, system)
+        for name, head in heads.items()
+        if head.name not in variables
+    }
+    return kept, measured
+
+
+def _with_unit(value: Any, unit: str) -> Any:
+    """Return a number with the unit of its column as a text; other values as they are."""
+    value = text_of(value)
+    return f"{float(value)!r} {unit}" if unit and is_number(value) else value
 
 
 @runtime_checkable

@@ -461,6 +461,7 @@ SWEEP_DATASETS = _by_path(
     Dataset(f"summary/{STATUS}", _CASES, "ok, still in contact, or why the case failed", "", TEXTS),
     Dataset(f"summary/{VALIDITY}", _CASES, "ok, reasons to doubt the case, or failed", "", TEXTS),
     Dataset("summary/*", _CASES, "{text}", OF_QUANTITY, NUMBERS),
+    Dataset("measured/*", _CASES, "{name} of the table of cases", "", ANY),
     Dataset("history/dt", _CASES, "time step of every case", "time"),
     Dataset("history/steps", _CASES, "number of steps of every case", "", "i8"),
     Dataset("history/unsettled_steps", _CASES,
@@ -534,6 +535,7 @@ FILES = {
         {
             "cases": "values of what varies",
             "summary": "what came out of every case",
+            "measured": "other columns of the table of cases, and their units as attributes",
             "history": "time steps of every case, and its contact force if asked for",
             "random": "laws of the random values",
             "design": "design that the random values were drawn from",

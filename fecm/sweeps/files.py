@@ -11,8 +11,9 @@ import numpy as np
 from fecm._errors import ResultFileError
 from fecm._text import csv_lines
 from fecm._typing import Floats
+from fecm.authoring.cases import CONVERTED, MEASURED
 from fecm.authoring.values import dimension_of
-from fecm.deck.units import column_name
+from fecm.deck.units import column_name, unit_of
 from fecm.results import schema
 from fecm.results.groups import ExportError
 from fecm.results.metrics import VERDICTS
@@ -195,6 +196,12 @@ def save_sweep(
             sink.store(f"cases/{name}", column, dimension_of(name))
         for name, column in result.summary.items():
             sink.store(f"summary/{name}", column)
+        if result.measured:
+            sink.attributes("measured", result.measured_units)
+        for name, column in result.measured.items():
+            unit = result.measured_units.get(name, "")
+            dimension = next((d for d in CONVERTED if unit_of(d, result.units) == unit), "")
+            sink.store(f"measured/{name.removeprefix(MEASURED)}", column, dimension)
         for name in OWN_ARRAYS:
             if name != "force" and (column := getattr(result, name)) is not None:
                 sink.store(f"history/{name}", column)
@@ -242,7 +249,7 @@ def sweep_csv_lines(sweep: StoredSweep, name: str = CASES) -> Iterator[str]:
 
 
 def _case_rows(sweep: StoredSweep) -> Iterator[Iterable[Any]]:
-    columns = {**sweep.cases, **sweep.summary}
+    columns = {**sweep.cases, **sweep.summary, **sweep.measured}
     texts = {name: columns.pop(name) for name in VERDICTS if name in columns}
     columns |= {"dt": sweep.dt, "steps": sweep.steps, **texts}
     yield ("case", *_headings(sweep, columns))

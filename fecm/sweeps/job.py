@@ -20,7 +20,13 @@ from fecm._options import documented, option, with_parameters_of
 from fecm._table import Row, Table, html_table
 from fecm._watch import LOGGER, CallerWatch, Progress, Watch
 from fecm.authoring.case import Case, CasesError, Limit, parse_exceed
-from fecm.authoring.cases import CaseTable, cases_of, index_of, texts_of
+from fecm.authoring.cases import (
+    CaseTable,
+    MeasuredColumn,
+    index_of,
+    table_of_cases,
+    texts_of,
+)
 from fecm.authoring.values import NAMES
 from fecm.deck.catalogue import system_of
 from fecm.mechanics.contact_law import Law
@@ -273,7 +279,7 @@ class Sweep:
         loaded = None
         if self.deck is not None:
             loaded = _loaded(self.deck)
-        cases, design = self._cases(loaded)
+        cases, design, measured = self._cases(loaded)
         self._check_sendable(own_measure, law)
         self._loaded = loaded or _first_built(self.build, cases)
         self.problem: Problem = self._loaded.problems[0]
@@ -292,16 +298,19 @@ class Sweep:
             limits=_limits(self.exceed),
             modes=reduced_mode_count(self.model, self.modes),
             law=law,
+            measured=measured,
         )
         check_draws(self.plan)
 
-    def _cases(self, loaded: LoadedDeck | None) -> tuple[list[Case], Design | None]:
-        """Return the cases, and the design of random cases."""
+    def _cases(
+        self, loaded: LoadedDeck | None
+    ) -> tuple[list[Case], Design | None, Mapping[str, MeasuredColumn]]:
+        """Return the cases, the design of random cases, and the measured columns of a table."""
         free = self.build is not None
         system = None if loaded is None else system_of(loaded.problems[0].deck)
-        cases = cases_of(self.vary, self.cases, free=free, system=system)
+        cases, measured = table_of_cases(self.vary, self.cases, free=free, system=system)
         if not self.random:
-            return cases, None
+            return cases, None, measured
         named = _by_name("random", self.random, "NAME=LAW")
         laws = {name: distribution_of(name, law, free=free) for name, law in named.items()}
         correlation: Any = self.correlation
@@ -319,7 +328,7 @@ class Sweep:
             sensitivity=self.sensitivity,
             correlation=joined,
         )
-        return random_cases(design, cases), design
+        return random_cases(design, cases), design, measured
 
     def _check_sendable(self, measure: MeasureFunction | None, law: Law | None) -> None:
         """Refuse functions that worker processes can't import."""

@@ -10,8 +10,9 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
+from types import MappingProxyType
 from typing import Any
 
 from fecm._version import __version__
@@ -24,6 +25,7 @@ from fecm.authoring.case import (
     Value,
     check_limits,
 )
+from fecm.authoring.cases import MeasuredColumn
 from fecm.authoring.timing import Clock, clock_of
 from fecm.authoring.values import (
     FAILURE_NAMES,
@@ -48,6 +50,7 @@ from fecm.sweeps.search import FIRST_VELOCITIES, Search, Sought, Until, search_o
 
 BuildFunction = Callable[[dict[str, Any]], Deck]  # of a case, whose values are any
 MeasureFunction = Callable[[Result], Mapping[str, float]]
+NO_COLUMNS: Mapping[str, MeasuredColumn] = MappingProxyType({})
 MOST_TOGETHER = 2048  # cases advanced together
 # Contact forces that are computed before they are evaluated, where none are stored: 16 MB, which
 # the C library keeps for the next ones and does not give back to the system.
@@ -110,6 +113,7 @@ class Plan:
     cases: tuple[Case, ...]
     design: Design | None = None  # of random cases
     limits: tuple[Limit, ...] = ()  # whose probability of exceedance is asked for
+    measured: Mapping[str, MeasuredColumn] = field(default_factory=dict)  # of the table of cases
 
     def fingerprint(self) -> str:
         """Return the hash that identifies the outcomes of this sweep."""
@@ -154,11 +158,13 @@ def plan(
     limits: Sequence[Limit] = (),
     modes: int | None = None,
     law: Law | None = None,
+    measured: Mapping[str, MeasuredColumn] = NO_COLUMNS,
 ) -> Plan:
     """Create the plan of a sweep.
 
     `extra` has names of :class:`Measure`, `until` the searched quantity. With `modes` the cases are
     computed by the reduced model. `law` is a user's contact law that replaces the deck's law.
+    `measured` has the measured columns of the table of cases.
     Raises CasesError if the deck has no impact, names exclude each other, the deck lacks what is
     searched or measured, or the reduced model does not give it.
     """
@@ -198,7 +204,7 @@ def plan(
         check_law(law, cases[0], modes)
     if modes is not None:
         _check_reduced(checked, cases[0], settings)
-    return Plan(settings, tuple(cases), design, tuple(limits))
+    return Plan(settings, tuple(cases), design, tuple(limits), measured)
 
 
 def check_law(law: Law, names: Collection[str], modes: int | None = None) -> None:

@@ -14,6 +14,7 @@ from fecm._errors import ResultFileError
 from fecm._files import check_outputs, open_for_writing
 from fecm._table import Table, html_table
 from fecm._typing import AnyFile
+from fecm.authoring.cases import MEASURED
 from fecm.deck.model import Delamination
 from fecm.deck.units import declared_units, unit_names
 from fecm.mechanics.own_law import law_name
@@ -69,6 +70,11 @@ class SweepResult(StoredSweep):
         Names of the units; empty if the deck states none.
     random : RandomResult or None
         Statistics, sensitivity indices and probabilities of a random sweep.
+    measured : dict of ndarray (n,)
+        Columns of the table of cases that are not varied, such as measured peaks, by their names
+        after ``measured_``; numbers are in the deck's units where their unit is known.
+    measured_units : dict
+        Units of these columns; a column without a unit is left out.
     reduced : ReducedModel or None
         Full runs beside the reduced model; None if the cases are not by that model.
     law : str
@@ -144,7 +150,7 @@ class SweepResult(StoredSweep):
         index = numbers if self.index is None else self.index
         if index.name is None and index.equals(numbers):
             index = numbers
-        table = pandas.DataFrame({**self.cases, **self.summary}, index=index)
+        table = pandas.DataFrame({**self.cases, **self.summary, **self.measured}, index=index)
         table.attrs["units"] = {str(n): unit for n in table.columns if (unit := self.unit(str(n)))}
         return table
 
@@ -180,7 +186,8 @@ class SweepResult(StoredSweep):
             texts = {"long_name": COLUMNS.get(name, ("",))[0], "units": self._unit(name)}
             return {key: text for key, text in texts.items() if text}
 
-        columns = {**self.cases, **self.summary, "dt": self.dt, "steps": self.steps}
+        columns = {**self.cases, **self.summary, **self.measured}
+        columns |= {"dt": self.dt, "steps": self.steps}
         added = {"unsettled_steps": self.unsettled_steps, "force": self.force}
         columns |= {name: values for name, values in added.items() if values is not None}
         variables = {}
@@ -364,6 +371,8 @@ def sweep_result(plan: Plan, outcome: Outcome, reduced: ReducedModel | None = No
         random=random,
         reduced=reduced,
         law="" if plan.settings.law is None else law_name(plan.settings.law),
+        measured={name: column.values for name, column in plan.measured.items()},
+        measured_units={name: column.unit for name, column in plan.measured.items() if column.unit},
     )
 
 
@@ -418,7 +427,7 @@ def sweep_of(contents: FileContents, *, history: bool = True) -> SweepResult:
     if not (summary.keys() >= required and steps.keys() >= {"dt", "steps"}):
         raise ResultFileError(f"{path}: the result of the sweep is incomplete")
     summary = {name: summary[name] for name in names if name in summary} | summary  # in order
-    groups = ("history/", "cases/", "summary/")
+    groups = ("history/", "cases/", "summary/", "measured/")
     if first_misfit(contents, [dataset for dataset in contents if dataset.startswith(groups)]):
         message = f"{path}: the data of this sweep do not match in type or number of cases"
         raise ResultFileError(message)
@@ -439,6 +448,8 @@ def sweep_of(contents: FileContents, *, history: bool = True) -> SweepResult:
         random=random_of(contents, cases, summary, len(steps["dt"])),
         reduced=reduced_check.reduced_of(contents),
         law=str(contents.attributes.get("law", "")),
+        measured={f"{MEASURED}{n}": v for n, v in _group(contents, "measured/").items()},
+        measured_units={n: str(v) for n, v in contents.groups.get("measured", {}).items()},
     )
 
 

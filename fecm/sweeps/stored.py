@@ -52,10 +52,13 @@ class StoredSweep:
     reduced: ReducedModel | None = None
     law: str = ""
     index: Any = None
+    measured: dict[str, Column] = field(default_factory=dict)
+    measured_units: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.cases = {name: read_only(values) for name, values in self.cases.items()}
         self.summary = {name: read_only(values) for name, values in self.summary.items()}
+        self.measured = {name: read_only(values) for name, values in self.measured.items()}
         for name in OWN_ARRAYS:
             if (values := getattr(self, name)) is not None:
                 setattr(self, name, read_only(values))
@@ -66,7 +69,7 @@ class StoredSweep:
     def __getitem__(self, name: str) -> Column:
         """Return values or results of every case, by name."""
         name = check_name(name, "a sweep has columns by name; rows are in to_dataframe()")
-        for columns in (self.cases, self.summary):
+        for columns in (self.cases, self.summary, self.measured):
             if name in columns:
                 return columns[name]
         raise self._lacks(name)
@@ -82,11 +85,11 @@ class StoredSweep:
         return [*super().__dir__(), *self]
 
     def __contains__(self, name: str) -> bool:
-        return name in self.cases or name in self.summary
+        return name in self.cases or name in self.summary or name in self.measured
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names of values and results."""
-        return iter(self.cases | self.summary)
+        return iter(self.cases | self.summary | self.measured)
 
     def keys(self) -> list[str]:
         """Return the names of values and results."""
@@ -167,5 +170,7 @@ class StoredSweep:
 
     def _unit(self, name: str) -> str:
         """Return the unit of any name; empty if it is unknown."""
+        if name in self.measured:
+            return self.measured_units.get(name, "")
         dimension = COLUMNS[name].dimension if name in COLUMNS else dimension_of(name)
         return unit_of(OWN_DIMENSIONS.get(name, dimension), self.units)

@@ -52,6 +52,8 @@ def sweep_rows(result: StoredSweep) -> list[Row]:
     rows: list[Row] = [("cases", f"{len(result)}")]
     if result.law:
         rows.append(("contact law", f"{result.law}, instead of EXPE"))
+    if result.measured:
+        rows.append(("measured", f"{', '.join(result.measured)}, which are not varied"))
     rows += [*_extremes(result), *_moved(result)]
     for reason, times in failed.most_common(MOST_REASONS):
         rows.append(("failed", f"{times}: {reason}"))
