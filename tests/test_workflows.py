@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import re
 import shutil
 import subprocess
+import tarfile
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -86,3 +88,32 @@ def test_the_site_is_built_of_files_and_extras_that_exist() -> None:
 
 def test_citation_and_package_have_the_same_authors() -> None:
     assert loaded("CITATION.cff")["authors"] == PROJECT["authors"]
+
+
+@pytest.mark.parametrize(("commits", "expected"), [(1, "9.8.7"), (2, "9.8.8.dev1")])
+def test_an_archive_of_a_tag_without_a_repository_has_its_version(
+    commits: int, expected: str, tmp_path: Path
+) -> None:
+    setuptools_scm = pytest.importorskip("setuptools_scm")
+    if shutil.which("git") is None:
+        pytest.skip("git is not installed")
+    repository, copy = tmp_path / "repository", tmp_path / "copy"
+    repository.mkdir()
+    copy.mkdir()
+
+    def git(*words: str) -> bytes:
+        command = ["git", "-c", "user.name=x", "-c", "user.email=x@example.org", *words]
+        return subprocess.run(command, cwd=repository, check=True, capture_output=True).stdout
+
+    for name in (".gitattributes", ".git_archival.txt"):
+        shutil.copy(ROOT / name, repository)
+    git("init", "-q")
+    git("add", ".")
+    git("commit", "-qm", "first")
+    git("tag", "v9.8.7")
+    for _ in range(commits - 1):
+        git("commit", "-qm", "next", "--allow-empty")
+    with tarfile.open(fileobj=io.BytesIO(git("archive", "HEAD"))) as archive:
+        archive.extractall(copy, filter="data")
+    (version, _, _) = setuptools_scm.get_version(copy).partition("+")
+    assert version == expected
