@@ -6,14 +6,11 @@ errors. The "measurement" is computed, with a scatter of 2 % of its peak, so tha
 known.
 """
 
-import warnings
-
 import matplotlib.pyplot as plt
 import numpy as np
 
 import fecm
 
-warnings.simplefilter("ignore", fecm.FecmWarning)  # the runs end in contact
 deck = fecm.read_one(fecm.examples.path("impact-patch.inp"))
 truth = fecm.run_one(deck.with_(k=1.6e6, velocity=120))
 time = truth.time[::20]

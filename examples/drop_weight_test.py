@@ -5,11 +5,8 @@ ASTM D7136 on a laminate of 24 plies: 5.5 kg fall on a plate of 150 × 100 mm. T
 delamination threshold long before its peak; from there on the run is that of an elastic plate.
 """
 
-import warnings
-
 import fecm
 
-warnings.simplefilter("ignore", fecm.FecmWarning)  # the plate leaves its range: see the summary
 deck = fecm.read_one(fecm.examples.path("drop-weight.inp")).with_(energy="10J")
 result = fecm.run_one(deck)
 print(result)

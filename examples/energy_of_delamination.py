@@ -5,11 +5,8 @@ The peak force of a drop weight over its energy, and the energy at which it reac
 threshold. The plate is stepped once for all energies.
 """
 
-import warnings
-
 import fecm
 
-warnings.simplefilter("ignore", fecm.FecmWarning)  # at high energies the plate leaves its range
 deck = fecm.read_one(fecm.examples.path("drop-weight.inp"))
 energies = [500.0 * n for n in range(1, 21)]  # mJ
 result = fecm.sweep(deck, {"energy": energies, "duration": [0.005]})

@@ -6,11 +6,8 @@ looks down on the plate: outlined cells are beyond failure, hatched ones are too
 for plate theory.
 """
 
-import warnings
-
 import fecm
 
-warnings.simplefilter("ignore", fecm.FecmWarning)  # plies fail, and the run continues elastically
 deck = fecm.read_one(fecm.examples.path("drop-weight.inp")).with_(energy="4.5J")
 result = fecm.run_one(deck)
 for failure in result.first_failures:

@@ -5,11 +5,8 @@ The energy of a drop weight and its contact scatter, and so does the force: the 
 exceeds a value, and that it exceeds the delamination threshold, from 512 impacts.
 """
 
-import warnings
-
 import fecm
 
-warnings.simplefilter("ignore", fecm.FecmWarning)  # some of the draws delaminate
 deck = fecm.read_one(fecm.examples.path("drop-weight.inp")).with_(energy="4.3J")
 laws = {"energy": "normal:4300,200", "k": "lognormal:42000,0.2"}  # mJ, N/mm^1.5
 result = fecm.sweep(deck, random=laws, samples=512, exceed={"peak_force": "threshold"})

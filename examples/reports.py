@@ -6,14 +6,12 @@ the report's experiment, a drop-weight test, a map, a probability, and a contact
 force.
 """
 
-import warnings
 from dataclasses import replace
 
 import numpy as np
 
 import fecm
 
-warnings.simplefilter("ignore", fecm.FecmWarning)  # the pages say how far each result holds
 report = fecm.examples.path("impact-patch.inp")
 measured = fecm.examples.path("measured-force.csv")
 drop = fecm.read_one(fecm.examples.path("drop-weight.inp"))

@@ -6,13 +6,10 @@ core, with the shear stiffness of equilibrium and with the plain sum of the laye
 the plate is far too stiff.
 """
 
-import warnings
-
 import matplotlib.pyplot as plt
 
 import fecm
 
-warnings.simplefilter("ignore", fecm.FecmWarning)  # the sum of the layers draws W466
 plate = fecm.Plate.rectangle((100, 100), (8, 8), support="simple")
 faces = fecm.Laminate("[0/90/0/90/0]", "IM7/8552", 0.25)
 mass, contact = fecm.RigidMass(1e-4), fecm.Contact.estimate(radius=8)  # 0.1 kg; mm, N, s

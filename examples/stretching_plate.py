@@ -5,13 +5,10 @@ A plate whose edges cannot approach each other stretches as it bends. The force 
 linear plate and on the one that stretches, over the energy.
 """
 
-import warnings
-
 import matplotlib.pyplot as plt
 
 import fecm
 
-warnings.simplefilter("ignore", fecm.FecmWarning)  # the linear plate leaves its range
 plate = fecm.Plate.rectangle((100, 100), (8, 8), support="clamped", grading=2.0)
 laminate = fecm.Laminate("[45/0/-45/90]2s", "IM7/8552", 0.131)
 mass, contact = fecm.RigidMass(1e-3), fecm.Contact.estimate(radius=8)  # 1 kg

@@ -56,9 +56,14 @@ class FecmWarning(UserWarning):
 warnings.filterwarnings("once", r"[^\n]*: warning\[W", FecmWarning, append=True)
 
 
-def warn(text: str) -> None:
-    """Issue a :class:`FecmWarning` at the first caller outside this package."""
+def warn(*texts: str) -> None:
+    """Issue one :class:`FecmWarning` at the first caller outside this package; none without texts.
+
+    Several texts, such as the notes of a result, are lines of one warning.
+    """
+    if not texts:
+        return
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and frame.f_code.co_filename.startswith(OURS):
         frame, level = frame.f_back, level + 1
-    warnings.warn(FecmWarning(text), stacklevel=level)
+    warnings.warn(FecmWarning("\n".join(texts)), stacklevel=level)

@@ -33,8 +33,8 @@ class Watch:
     def advance(self, done: int, total: int) -> None:
         """Receive the number of steps or cases that are done, and their total."""
 
-    def note(self, text: str) -> None:
-        """Receive a message for the user."""
+    def note(self, *texts: str) -> None:
+        """Receive messages for the user."""
 
     def stops(self) -> bool:
         """Return whether the job should stop in good order."""
@@ -71,9 +71,9 @@ class CallerWatch(Watch):
         if self._due():
             LOGGER.info("%s: %d of %d done", self._name, done, total)
 
-    def note(self, text: str) -> None:
-        """Issue a warning."""
-        warn(text)
+    def note(self, *texts: str) -> None:
+        """Issue one warning."""
+        warn(*texts)
 
     def stops(self) -> bool:
         """Return whether SIGINT came in the block of :meth:`deferring_interrupts`."""

@@ -47,9 +47,9 @@ class StopAfter(fecm.Watch):
         self.done = done
         self.totals.add(total)
 
-    def note(self, text: str) -> None:
-        """Keep a note."""
-        self.notes.append(text)
+    def note(self, *texts: str) -> None:
+        """Keep notes."""
+        self.notes += texts
 
     def stops(self) -> bool:
         """Whether enough is done."""

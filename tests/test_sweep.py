@@ -438,9 +438,9 @@ class Notes(fecm.Watch):
     def __init__(self) -> None:
         self.notes: list[str] = []
 
-    def note(self, text: str) -> None:
-        """Keep a note."""
-        self.notes.append(text)
+    def note(self, *texts: str) -> None:
+        """Keep notes."""
+        self.notes += texts
 
 
 def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:

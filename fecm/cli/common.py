@@ -90,9 +90,9 @@ class TerminalWatch(Watch):
         new, self.done = done - self.done, done
         self._advance(new)
 
-    def note(self, text: str) -> None:
-        """Print a note."""
-        self._notes.append(text)
+    def note(self, *texts: str) -> None:
+        """Print notes."""
+        self._notes += texts
         if not sys.stderr.isatty():
             self.close()
 

@@ -279,8 +279,7 @@ def identify(
     1900000.0
     """
     fit = IdentificationJob(deck, (time, force), free, filter, law).execute()
-    for text in fit.notes:
-        warn(text)
+    warn(*fit.notes)
     return fit
 
 

@@ -227,8 +227,7 @@ def locate(job: LocationJob) -> Location:
     (112.5, 81.0, 160.5)
     """
     location = job.execute()
-    for text in location.notes:
-        warn(text)
+    warn(*location.notes)
     return location
 
 

@@ -456,8 +456,7 @@ class ProblemRun:
             watch.advance(simulation.state.plate.step, problem.work.steps)
             result = Result(sink.arrays, sink.texts, sink.groups)
             yield result
-        for text in result.notes:
-            watch.note(text)
+        watch.note(*result.notes)
 
     @contextlib.contextmanager
     def _into_file(self, path: Path, watch: Watch) -> Iterator[Result]:
@@ -503,8 +502,7 @@ class ProblemRun:
             watch.advance(simulation.state.plate.step, self.problem.work.steps)
             yield result
         checkpointer.clear()
-        for text in simulation.state.notes:
-            watch.note(text)
+        watch.note(*simulation.state.notes)
         self._finish()
 
     def _finish(self) -> None:

@@ -186,8 +186,7 @@ def estimate(deck: str | Path | Deck) -> Estimate:
     4650 and 4790 N
     """
     result = estimate_problem(sole_problem(deck))
-    for text in result.notes:
-        warn(text)
+    warn(*result.notes)
     return result
 
 

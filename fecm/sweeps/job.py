@@ -480,8 +480,7 @@ class Sweep:
             if defers_interrupts:
                 stack.enter_context(caller.deferring_interrupts())
             result = self.compute(watch)
-        for text in result.notes:
-            watch.note(text)
+        watch.note(*result.notes)
         for run in self.full_runs().values():
             run.execute(watch)
         return result

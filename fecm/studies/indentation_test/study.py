@@ -180,8 +180,7 @@ def fit_indentation(
     Contact(k=1330500.0, alpha_p=0.00076098, s_p=0.10378, q=2.4795, word='')
     """
     fit = fit_law(_measured(test, columns or (), units), q=q, acr=acr, turn=turn)
-    for text in fit.notes:
-        warn(text)
+    warn(*fit.notes)
     return fit
 
 
