@@ -55,7 +55,7 @@ from fecm.authoring.numerics import (
 )
 from fecm.authoring.parameters import ObjectError, check_kind, check_positive, in_units, is_finite
 from fecm.authoring.plate import DropWeight, Plate
-from fecm.authoring.zones import Zone, laminates_of, placed_zones
+from fecm.authoring.zones import ElementLaminates, Zone, laminates_of, placed_zones
 from fecm.deck import model
 from fecm.deck.catalogue import STANDARD, SYSTEM, NamedContact
 from fecm.deck.findings import DeckError
@@ -72,11 +72,11 @@ from fecm.problem.parts import projectile_segment
 LONGEST_LAYUP = 60  # characters; a title has the number of plies instead of a longer layup
 
 
-def default_title(plate: Plate, laminate: Laminate, deck: model.Deck, plies: DeckPlies) -> str:
-    """Return a title such as ``D7136 [45/0/-45/90]3s IM7/8552, 10 J``."""
+def title_of(plate: Plate, laminate: Laminate, plies: DeckPlies) -> str:
+    """Return a title such as ``D7136 [45/0/-45/90]3s IM7/8552``."""
     names = dict.fromkeys(named.name for _, named in plies.named)
     words = (_plate_name(plate), _layup_name(laminate), " + ".join(names))
-    return f"{' '.join(filter(None, words))}, {format_energy(deck, plies)}"
+    return " ".join(filter(None, words))
 
 
 def _plate_name(plate: Plate) -> str:
@@ -399,7 +399,7 @@ def author(request: Request) -> Authored:
     if motion.duration is None:  # with far too thin plies, the estimate of the duration takes long
         check_thickness(plies)
 
-    mesh, node, patch = place_impact(request.plate, plies, strike.at, patch, doubts)
+    mesh, node, patch, _ = place_impact(request.plate, plies, strike.at, patch, doubts)
     zones = placed_zones(request.zones, in_zones, mesh, node, doubts)
     struck = plies.layups[zones.struck - MATERIAL]
     law, comment = indentation_law(strike.contact, plies, struck)
@@ -423,25 +423,9 @@ def author(request: Request) -> Authored:
         )
     if request.numerics.failure and not any(isinstance(s, model.Allowables) for s in damage):
         damage = [strengths_of(plies), *damage]
-    segments = (
-        _unit_segment(request, plies),
-        mesh.coordinates(),
-        mesh.element_cards(),
-        _projectile_segment(strike.projectile),
-        model.Impact(node, 3, 1.0 if motion.velocity is None else motion.velocity),
-        patch,
-        _gage_segment(request.gages),
-        *damage,
-        cure_segment(plies, request.cure),
-        law,
-        request.numerics.shear_segment(),
-        curvature_of(request.radius_x, request.radius_y),
-        _preload_segment(request, plies),
-        *plies.segments(),
-        zones.card,
-    )
-    control = Control(mesh.nodes, mesh.elements, len(plies.layups[0]), 2, 5, mesh.most_nodes)
-    plain = model.Deck("", control, tuple(s for s in segments if s is not None), ())
+    hit = model.Impact(node, 3, 1.0 if motion.velocity is None else motion.velocity)
+    load = (_projectile_segment(strike.projectile), hit, patch)
+    plain = assemble(request, plies, mesh, zones, load, damage, law)
     if motion.energy is not None:
         plain = with_energy(plain, motion.energy)
     notes += [
@@ -455,16 +439,15 @@ def author(request: Request) -> Authored:
         radius = patch.radius or RADIUS_PER_THICKNESS[patch.shape] * plies.thickness
         softest = min(plies.of(layer).ply.e2 for layer in struck)
         doubts += doubts_of_soft_tip(strike.contact, radius, law.k, energy_of(plain), softest)
-    title = (
-        default_title(request.plate, request.laminate, plain, plies)
-        if request.title is None
-        else request.title
-    )
+    title = request.title
+    if title is None:
+        named = title_of(request.plate, request.laminate, plies)
+        title = f"{named}, {format_energy(plain, plies)}"
     plain = replace(plain, title=title)
 
     structure = with_kinematics(
         request.kinematics,
-        lambda nonlinear: _with_supports(request, plain, mesh, plies, nonlinear=nonlinear),
+        lambda nonlinear: with_supports(request, plain, mesh, plies, nonlinear=nonlinear),
     )
     dt = request.numerics.time_step(structure.deck)
     doubts += _doubts_of_duration(motion.duration, dt, plies.system)
@@ -473,7 +456,39 @@ def author(request: Request) -> Authored:
     return Authored(deck, comments, [*notes, *structure.notes], doubts)
 
 
-def _with_supports(
+def assemble(
+    request: Request,
+    plies: DeckPlies,
+    mesh: AnyMesh,
+    zones: ElementLaminates,
+    load: Iterable[model.Segment | None],
+    damage: Iterable[model.Segment],
+    law: model.Indentation | None = None,
+) -> model.Deck:
+    """Return a deck with the segments in their usual order, without title, supports and program.
+
+    `load` has the segments of the impact or of the static load.
+    """
+    segments = (
+        _unit_segment(request, plies),
+        mesh.coordinates(),
+        mesh.element_cards(),
+        *load,
+        _gage_segment(request.gages),
+        *damage,
+        cure_segment(plies, request.cure),
+        law,
+        request.numerics.shear_segment(),
+        curvature_of(request.radius_x, request.radius_y),
+        _preload_segment(request, plies),
+        *plies.segments(),
+        zones.card,
+    )
+    control = Control(mesh.nodes, mesh.elements, len(plies.layups[0]), 2, 5, mesh.most_nodes)
+    return model.Deck("", control, tuple(s for s in segments if s is not None), ())
+
+
+def with_supports(
     request: Request, plain: model.Deck, mesh: AnyMesh, plies: DeckPlies, *, nonlinear: bool
 ) -> SupportedDeck:
     """Add the supports to a deck, and NONL for a nonlinear plate."""

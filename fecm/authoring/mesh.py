@@ -39,6 +39,7 @@ class Placed(NamedTuple):
     mesh: AnyMesh
     node: int
     patch: Patch | None
+    point: tuple[float, float]  # place of the node
 
 
 def place_impact(
@@ -47,10 +48,12 @@ def place_impact(
     at: tuple[float, float] | None,
     patch: Patch | None,
     doubts: list[str],
+    load: str = "impact point",
 ) -> Placed:
     """Return the mesh, the impact node and the patch for an impact at a point.
 
-    If the point is moved to a node or the mesh is refined, `doubts` gets a text about it.
+    If the point is moved to a node or the mesh is refined, `doubts` gets a text about it, which
+    calls the point `load`.
     """
     point = None if at is None else number_pair("at", at)
     mesh = plate.imported or plate_grid(plate, point, None if patch is None else patch.radius)
@@ -75,11 +78,11 @@ def place_impact(
         else:
             origin = "the plate's centre" if at is None else "`at`"
             doubts.append(
-                f"the impact point is moved by {distance:.4g}: from {origin} at {x:g}, {y:g} to "
+                f"the {load} is moved by {distance:.4g}: from {origin} at {x:g}, {y:g} to "
                 f"the nearest node, {node} at {node_x:g}, {node_y:g}"
             )
     doubts += _doubts_of_refinement(plate, mesh, patch)
-    return Placed(mesh, node, patch)
+    return Placed(mesh, node, patch, (node_x, node_y))
 
 
 def _doubts_of_refinement(plate: Plate, mesh: AnyMesh, patch: Patch | None) -> list[str]:

@@ -138,7 +138,7 @@ def with_plate(deck: model.Deck, plate: Plate, at: tuple[float, float] | None) -
         raise ObjectError(f"`plate`: the fixture's standard is in {STANDARD}, and the deck is not")
     old_patch, doubts = deck.last(model.Patch), list[str]()
     patch = None if old_patch is None else replace(old_patch, x=None, y=None, source=None)
-    mesh, node, patch = place_impact(plate, plies_of_deck(deck), at, patch, doubts)
+    mesh, node, patch, point = place_impact(plate, plies_of_deck(deck), at, patch, doubts)
     stretches = deck.has(model.Nonlinear) or is_coupled(deck)
     membrane = MembraneSupport.of(curved=is_curved(deck), stretches=stretches)
     boundary, _ = support_plate(plate, mesh, None, [], membrane)
@@ -158,9 +158,12 @@ def with_plate(deck: model.Deck, plate: Plate, at: tuple[float, float] | None) -
         control=control,
         segments=(mesh.coordinates(), mesh.element_cards(), *supports, *kept),
     )
+    strike = deck.last(model.Impact)
     if old_patch is not None and patch is not None:
+        if strike is None:
+            patch = patch.centred(point)
         changed = swapped(changed, old_patch, patch)
-    if (strike := deck.last(model.Impact)) is not None:
+    if strike is not None:
         changed = swapped(changed, strike, replace(strike, node=node, source=None))
     return changed
 

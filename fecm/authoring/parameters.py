@@ -21,6 +21,7 @@ EXAMPLES = {
     "time": "4ms",
     "force/length": "50N/mm",
     "length": "6mm",
+    "force": "10N",
     MASS: "5kg",
     MODULUS: "60MPa",
 }

@@ -158,6 +158,10 @@ class Patch(Segment, keyword="PATC"):
         "F10 static load|load",
     )
 
+    def centred(self, point: tuple[float, float]) -> Self:
+        """Return the patch around a point unless it has a centre; for decks without ROD."""
+        return self if self.x is not None else replace(self, x=point[0], y=point[1])
+
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
         """Read the card, which starts with a word other than the keyword of another segment."""

@@ -256,8 +256,8 @@ def _impact_rows(summary: ProblemSummary) -> Iterator[Row]:
         return f"{text} ({in_si})" if in_si else text
 
     yield ("plate mass", mass_text(summary.plate_mass))
-    yield ("projectile mass", mass_text(summary.projectile_mass))
     if summary.velocity is not None and summary.energy is not None:
+        yield ("projectile mass", mass_text(summary.projectile_mass))
         energy = _quantity(summary, summary.energy, "force*length")
         velocity = _quantity(summary, summary.velocity, "length/time")
         yield ("impact", f"{velocity}, {energy}")
