@@ -411,3 +411,40 @@ def test_a_last_node_in_no_element_at_the_place_of_another_is_left_out(
     card = "CQUAD4,1,1,1,2,3,4"
     mesh = read(tmp_path, bulk(*corners(), f"GRID,99,,0.,0.,{height}", card))
     assert (mesh.nodes, mesh.elements) == (4, 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.inp", "! plate\n/PREP7\nET,1,SHELL181\n", "is an input or an archive of Ansys, .*VTK"),
+        ("a.cdb", "*IF,A,EQ,1,THEN\n/PREP7\n", "is an input or an archive of Ansys"),
+        ("a.msh", "$NOD\n1\n1 0 0 0\n$ENDNOD\n", "MSH 1.0, .*save the mesh as MSH 2.2"),
+        ("a.unv", "    -1\n  2411\n", "universal file .UNV.*save the mesh as MSH 2.2"),
+        ("a.geo", "Point(1) = {0, 0, 0, 1};\n", "script of Gmsh.*-format msh22"),
+        ("a.step", "ISO-10303-21;\n", "CAD model.*midsurface"),
+    ],
+)
+def test_a_mesh_of_a_format_that_is_not_read_is_named_with_the_export_that_is(
+    tmp_path: Path, name: str, text: str, message: str
+) -> None:
+    pytest.importorskip("meshio", reason="meshes are read by meshio")
+    with pytest.raises(fecm.MeshError, match=message):
+        read(tmp_path, text, name)
+
+
+def test_triangles_beside_quadrilaterals_are_refused_with_a_way_out(tmp_path: Path) -> None:
+    pytest.importorskip("meshio", reason="meshes are read by meshio")
+    cards = bulk(*corners(), "CQUAD4,1,1,1,2,3,4", "CTRIA3,2,1,1,2,3")
+    with pytest.raises(fecm.MeshError, match=r"CTRIA3 2 is beside .*SubdivisionAlgorithm = 1"):
+        read(tmp_path, cards)
+    text = ROWS["nodes"] + FIRST + "*ELEMENT, TYPE=S3\n9, 5, 6, 9\n"
+    with pytest.raises(fecm.MeshError, match=r"quad and triangle .*SubdivisionAlgorithm = 1"):
+        read(tmp_path, text, "plate.inp")
+
+
+def test_the_name_of_an_included_file_may_continue_in_the_next_lines(tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "nodes.bdf").write_text("\n".join(corners()) + "\n")
+    for name in ("'sub/\nnodes.bdf'", "'su\nb/nodes\n.bdf'  $ comment", '"sub/\n  nodes.bdf"'):
+        text = f"BEGIN BULK\nINCLUDE {name}\nCQUAD4,1,1,1,2,3,4\nENDDATA\n"
+        assert read(tmp_path, text).nodes == 4

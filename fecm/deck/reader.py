@@ -85,12 +85,40 @@ class OtherFile(NamedTuple):
 
     lines: str  # pattern of one or two of its first lines
     what: str
-    hint: str
+    hint: str  # for a deck
+    export: str = ""  # how its mesh can be taken; empty if meshes are read from it, or it has none
 
 
 FIRST_LINES = 20  # number of lines that identify the program of a file
 TAKES_A_MESH = "`fecm new DECK --mesh FILE`, or fecm.Plate.from_mesh, takes a mesh from it"
+SAVE_MSH = "open it in Gmsh and save the mesh as MSH 2.2 (`gmsh FILE -save -format msh22`)"
+
+
+def _without_mesh(lines: str, what: str, export: str) -> OtherFile:
+    return OtherFile(lines, what, f"{export}; `fecm new DECK --mesh FILE` takes that", export)
+
+
 OTHER_FILES = (
+    _without_mesh(
+        r"/(prep7|batch|nopr|com|title|clear|solu|units|filname)\b|et,|[ne]block,|finish\b"
+        r"|cdread,|wpstyle,|keyopt,|mp(data|temp)?,",
+        "an input or an archive of Ansys",
+        "write the model for the solver Nastran (bulk data), or convert its archive (CDWRITE) to "
+        "VTK, as the Python package mapdl-archive does",
+    ),
+    _without_mesh(r"\$nod\b", "a mesh of Gmsh in the format MSH 1.0", SAVE_MSH),
+    _without_mesh(r"-1[ \t]*\n\d{2,4}[ \t]*$", "a universal file (UNV)", SAVE_MSH),
+    _without_mesh(
+        r"(setfactory|point|line|rectangle|circle)\s*\(.*;",
+        "a script of Gmsh",
+        "let Gmsh make the mesh: `gmsh -2 -format msh22 FILE`",
+    ),
+    _without_mesh(
+        r"iso-10303-21;|.*S {6}1[ \t]*$",
+        "a CAD model (STEP or IGES)",
+        "mesh the midsurface of the plate in Gmsh and save it as MSH 2.2",
+    ),
+    OtherFile(r"# vtk datafile|<vtkfile|<xdmf", "a mesh in the format VTK or XDMF", TAKES_A_MESH),
     OtherFile(
         r"\*keyword\b|\$#|\$(?!meshformat).*\n\*[a-z]",
         "an input file of LS-DYNA",
@@ -105,9 +133,14 @@ OTHER_FILES = (
         TAKES_A_MESH,
     ),
     OtherFile(
-        r"<\?xml|<!doctype|<elamx",
+        r"<\?xml|<[!a-z]",
         "an XML file, such as eLamX writes",
         "`fecm new DECK --layup ... --ply ...` makes a deck from its layup and material",
+    ),
+    OtherFile(
+        r"[{\[]\s*([\"{\[\]}]|$)",
+        "a JSON file",
+        "a deck has lines of cards: `fecm new DECK --layup ... --material ...` makes one",
     ),
     OtherFile(
         r"feap\b",
@@ -164,7 +197,7 @@ class Reader:
                     break
                 problems.append(self._read_problem(card))
             elif not (problems or self.findings) and (
-                program := _identify_program(self.cards.lines)
+                program := identify_program(self.cards.lines)
             ):
                 message = f"This is {program.what}, not a deck."
                 self.findings.add("E013", message, card.place, program.hint)
@@ -385,7 +418,7 @@ class Reader:
         return tables
 
 
-def _identify_program(lines: Sequence[str]) -> OtherFile | None:
+def identify_program(lines: Sequence[str]) -> OtherFile | None:
     """Identify the other program that a file belongs to by its first lines; None if unknown."""
     text = "\n".join(line.lstrip() for line in lines[:FIRST_LINES])
     if re.search(rf"^{TITLE}", text, re.MULTILINE):

@@ -99,8 +99,12 @@ declare(
     "E013",
     Subject.FRAME,
     "The file is an input of another program.",
-    cause="Abaqus, CalculiX, eLamX, FEAP, Gmsh, LS-DYNA and Nastran are known by their beginning.",
-    remedy=("`fecm new --mesh FILE` takes a mesh. FEAP: [what to change](deck.md#decks-of-feap)."),
+    cause="Abaqus, Ansys, CalculiX, eLamX, FEAP, Gmsh, LS-DYNA and Nastran, and files in UNV, VTK, "
+    "XML, JSON, STEP and IGES, are known by their beginning.",
+    remedy=(
+        "`fecm new --mesh FILE` takes a mesh; the hint says how to export one. FEAP: "
+        "[what to change](deck.md#decks-of-feap)."
+    ),
 )
 
 # Numbers.

@@ -89,11 +89,17 @@ def _binary(body: bytes, order: str) -> Take:
     return take
 
 
+# What to do with a mesh of quadrilaterals and triangles.
+ALIKE_ELEMENTS = (
+    "mesh the plate with triangles alone, or with quadrilaterals alone (in Gmsh, "
+    "Mesh.SubdivisionAlgorithm = 1 splits all elements into quadrilaterals)"
+)
 DEPTH = 10  # deepest nesting of INCLUDE
 MOST_SYSTEMS = 100  # within one another
 PARALLEL = 1e-9
 _NUMBER = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:[EeDd]?([+-]?[0-9]+))?")
 _INCLUDE = re.compile(r"\s*INCLUDE\s*(['\"]?)(.+?)\1\s*", re.IGNORECASE)
+_OPEN_INCLUDE = re.compile(r"\s*INCLUDE\s*(?:'[^']*|\"[^\"]*)", re.IGNORECASE)
 _BULK = re.compile(r"\s*BEGIN\b", re.IGNORECASE)
 _SYSTEM = re.compile(r"CORD([12])([RCS])")
 # Cards that start with C but are not elements.
@@ -258,7 +264,9 @@ class _Reader:
         for keyword, card in self._elements:
             if ELEMENTS[keyword].nodes != ELEMENTS[first].nodes:
                 raise card.error(
-                    keyword, f"is beside {first}; all elements must have the same number of nodes"
+                    keyword,
+                    f"is beside {first}; all elements must have the same number of nodes: "
+                    f"{ALIKE_ELEMENTS}",
                 )
             cells.append([rows[node] for node in self._nodes(keyword, card)])
         groups: dict[str, list[int]] = {}
@@ -399,10 +407,31 @@ def _fields(line: str) -> tuple[list[str], str, str, str]:
     return fields, name, name.lstrip("+*"), follows.lstrip("+*")
 
 
+def _with_whole_includes(lines: list[str]) -> list[str]:
+    """Return lines with the name of a file that continues in the next lines in one of them.
+
+    Blank lines take the place of the lines that are moved.
+    """
+    whole: list[str] = []
+    opened = -1  # row of an INCLUDE whose name is not closed
+    for row, line in enumerate(lines):
+        if opened >= 0:
+            whole[opened] += line.partition("$")[0].strip()
+            whole.append("")
+            opened = -1 if whole[opened][-1:] in ("'", '"') else opened
+            continue
+        whole.append(line)
+        if _OPEN_INCLUDE.fullmatch(line):
+            whole[row] = line.partition("$")[0].rstrip()
+            opened = row
+    return whole
+
+
 def _lines(path: Path, depth: int) -> Iterator[tuple[str, str]]:
     """Yield places and texts of the lines of bulk data, including other files."""
     text = read_input(path).decode("latin-1")
     lines = re.split("\r\n|\r|\n", text)
+    lines = _with_whole_includes(lines)
     starts = [number for number, line in enumerate(lines) if _BULK.match(line)]
     begin = starts[0] + 1 if starts else 0
     for number, line in enumerate(lines[begin:], start=begin + 1):

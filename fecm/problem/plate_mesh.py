@@ -25,6 +25,7 @@ from fecm.deck.grid import (
     round_to,
 )
 from fecm.deck.model import Boundary, Control, Coordinates, Elements
+from fecm.deck.reader import identify_program
 from fecm.mechanics.joints import (
     coincident,
     hanging_nodes,
@@ -39,7 +40,7 @@ from fecm.problem.abaqus_sets import (
     node_sets,
     nodes_and_elements,
 )
-from fecm.problem.mesh_readers import NastranError, physical_groups, read_nastran
+from fecm.problem.mesh_readers import ALIKE_ELEMENTS, NastranError, physical_groups, read_nastran
 
 Integers = NDArray[np.int_]
 # meshio's names of cells by their number of nodes, and by their number of corners.
@@ -74,6 +75,7 @@ ABAQUS_GENERATE = re.compile(
     rb"^\*(?:n|el)set\b[^\n]*\bgenerate\b[^\n]*\n((?:[^*\n][^\n]*\n?)*)",
     re.IGNORECASE | re.MULTILINE,
 )
+HEAD = 10_000  # bytes that identify the program of a file
 SAME = 1e-9  # largest difference of equal coordinates, over the size of the mesh
 NO_AREA = 1e-12  # largest area of a degenerate element, over the square of the size
 NAMED = 8  # largest number of elements named in a message
@@ -241,6 +243,9 @@ def read_mesh(path: str | Path) -> PlateMesh:
         import meshio
     except ModuleNotFoundError:
         raise ImportError("meshes need meshio: pip install 'fecm[mesh]'") from None
+    head = text[:HEAD].decode("latin-1").splitlines()
+    if (program := identify_program(head)) is not None and program.export:
+        raise MeshError(f"{path} is {program.what}, whose mesh is not read: {program.export}")
     _check_whole(path, text)
     printed = io.StringIO()
     try:
@@ -385,6 +390,7 @@ def from_meshio(read: MeshLike, where: str = "") -> PlateMesh:
         what = "no elements with an area (in Gmsh, give the surface a physical group too)"
         what = f"{' and '.join(kinds)} elements" if kinds else what
         must = "all must be triangles of 3 or 6 nodes, or all quadrilaterals of 4, 8 or 9"
+        must += f": {ALIKE_ELEMENTS}" if len(kinds) > 1 else ""
         raise MeshError(f"{where}the mesh has {what}; {must}")
     groups: dict[str, list[Any]] = {}
     surfaces: dict[str, list[Any]] = {}
