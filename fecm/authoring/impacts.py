@@ -44,6 +44,7 @@ class Impacts:
     mass: Floats
     scale: Floats  # factor for the mass and the stiffness of the kind
     toughness: Floats  # G_IIc, force/length; NaN without a DELA segment
+    factor: int  # symmetric parts of the plate, of which the deck has one with its part of the mass
     own_law: Law | None  # contact law of the user, instead of the constants
     cards: Callable[[int], Strike]  # impact of a row as cards
 
@@ -52,8 +53,8 @@ class Impacts:
 
     @property
     def energy(self) -> Floats:
-        """Kinetic energy of the projectile before the impact, force*length."""
-        return 0.5 * self.mass * self.velocity**2
+        """Kinetic energy of the projectile that hits the whole plate, force*length."""
+        return 0.5 * self.factor * self.mass * self.velocity**2
 
     def select(self, rows: NDArray[np.intp]) -> Impacts:
         """Return the impacts of some rows."""
@@ -109,11 +110,17 @@ def impacts_of(
         return impacts, reasons
     if impacts is not None:
         strikes |= {number: impacts.cards(row) for row, number in enumerate(impacts.numbers)}
-    return impacts_from_cards(dict(sorted(strikes.items())), own_law), reasons
+    strikes = dict(sorted(strikes.items()))
+    return impacts_from_cards(strikes, own_law, checked.symmetry.factor), reasons
 
 
-def impacts_from_cards(strikes: Mapping[int, Strike], own_law: Law | None = None) -> Impacts:
-    """Return the impacts of strikes, given by the numbers of their cases."""
+def impacts_from_cards(
+    strikes: Mapping[int, Strike], own_law: Law | None = None, factor: int = 1
+) -> Impacts:
+    """Return the impacts of strikes, given by the numbers of their cases.
+
+    `factor` is the number of symmetric parts of the plate, of which the deck has one.
+    """
     rows = list(strikes.values())
     units = [UNIT if isinstance(row.projectile, RigidMass) else row.projectile for row in rows]
     kinds = {unit: place for place, unit in enumerate(dict.fromkeys(units))}
@@ -127,6 +134,7 @@ def impacts_from_cards(strikes: Mapping[int, Strike], own_law: Law | None = None
         mass=mass,
         scale=np.where([unit is UNIT for unit in units], mass, 1.0),
         toughness=np.array([_toughness(row) for row in rows]),
+        factor=factor,
         own_law=own_law,
         cards=rows.__getitem__,
     )
@@ -141,7 +149,8 @@ def _from_values(
     if strike.impact is None or strike.indentation is None or not _fits_columns(strike, names):
         return None
     values = {name: np.array([float(case[name]) for case in cases]) for name in names}
-    columns, valid = _columns(strike, strike.indentation, values, len(cases))
+    factor = checked.symmetry.factor
+    columns, valid = _columns(strike, strike.indentation, values, len(cases), factor)
     rows = np.flatnonzero(valid)
     try:  # everything else is the same for all cases, so one check is enough
         strike.check(checked)
@@ -168,11 +177,16 @@ def _fits_columns(strike: Strike, names: Collection[str]) -> bool:
 
 
 def _columns(
-    strike: Strike, law: model.Indentation, values: Mapping[str, Floats], count: int
+    strike: Strike,
+    law: model.Indentation,
+    values: Mapping[str, Floats],
+    count: int,
+    factor: int,
 ) -> tuple[Impacts, Bools]:
     """Return the columns of cases, and a mask of the valid cases.
 
     `values` has the values of the cases by name. The strike of the deck has all other values.
+    `factor` is the number of symmetric parts of the plate: energies are those of the whole plate.
     """
     projectile, rigid = strike.projectile, isinstance(strike.projectile, RigidMass)
     total = next((values[name] for name in MASSES if name in values), projectile.total_mass)
@@ -182,7 +196,7 @@ def _columns(
     with np.errstate(all="ignore"):
         if "energy" in values:
             valid &= values["energy"] >= 0.0
-            velocity = np.sqrt(2.0 * values["energy"] / mass)
+            velocity = np.sqrt(2.0 * values["energy"] / factor / mass)
         valid &= velocity >= 0.0
     stated = [
         np.array(np.broadcast_to(values.get(name, constant), count))
@@ -202,6 +216,7 @@ def _columns(
         mass=mass,
         scale=mass if rigid else np.ones(count),
         toughness=toughness,
+        factor=factor,
         own_law=None,
         cards=lambda row: strike,
     )

@@ -26,6 +26,7 @@ from fecm.problem.check import check_impact, check_segment
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_constants, build_projectile, projectile_segment
 from fecm.problem.problem import Problem
+from fecm.problem.symmetry import symmetry_factor
 
 _S = TypeVar("_S", bound=model.Segment)
 
@@ -52,7 +53,7 @@ class Strike(NamedTuple):
 
     @property
     def energy(self) -> float:
-        """Kinetic energy of the projectile before the impact, force*length."""
+        """Kinetic energy of the deck's projectile before the impact, force*length."""
         return 0.5 * self.projectile.total_mass * self.velocity**2
 
     def with_velocity(self, velocity: float) -> Strike:
@@ -130,11 +131,15 @@ def set_velocity(strike: Strike, value: Value) -> Strike:
 
 
 def set_energy(strike: Strike, value: Value) -> Strike:
-    """Change the velocity of ROD so that the projectile has an energy."""
+    """Change the velocity of ROD so that the projectile has an energy.
+
+    The deck of a symmetric part has its part of the energy.
+    """
     mass, energy = strike.projectile.total_mass, float(value)
     if not (mass > 0.0 and energy >= 0.0):
         raise CasesError(f"no velocity gives the energy {energy:g} to the mass {mass:g}")
-    return strike.with_velocity(math.sqrt(2.0 * energy / mass))
+    factor = symmetry_factor(strike.plate)
+    return strike.with_velocity(math.sqrt(2.0 * energy / factor / mass))
 
 
 def constant(name: str) -> StrikeSetter:
@@ -143,7 +148,10 @@ def constant(name: str) -> StrikeSetter:
 
 
 def set_radius(strike: Strike, value: Value) -> Strike:
-    """Change k to the estimate for a steel sphere on the laminate of the deck."""
+    """Change k to the estimate for a steel sphere on the laminate of the deck.
+
+    The deck of a symmetric part has its part of k.
+    """
     unit = in_si(MODULUS, unit_names(strike.plate))
     if unit is None:
         hint = "add a UNIT segment, or vary k instead"
@@ -156,7 +164,7 @@ def set_radius(strike: Strike, value: Value) -> Strike:
         k = hertz_coefficient(float(value), steel, STEEL_POISSON, modulus)
     except ValueError as error:
         raise CasesError(f"k cannot be estimated: {error}") from None
-    return strike.with_constant("k", k)
+    return strike.with_constant("k", k / symmetry_factor(strike.plate))
 
 
 def struck_layers(deck: model.Deck) -> tuple[model.Layer, ...]:

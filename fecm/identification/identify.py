@@ -296,6 +296,11 @@ def _shared_backend(deck: Deck) -> Backend:
         loads = "FORC, EXCD, TANG, FORM and SOLV"
         needed = f"impact steps (RODP) of one size, and a plate without {loads}"
         raise StudyError(f"identify needs {needed}")
+    if problem.symmetry.lines:
+        raise StudyError(
+            "identify needs the whole plate, and the deck has lines of symmetry: a measured force "
+            "is that of the whole plate, mass and k are those of the part"
+        )
     return backend_of(problem)
 
 

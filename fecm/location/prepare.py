@@ -47,6 +47,7 @@ from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
 from fecm.problem.problem import Problem
 from fecm.problem.refine import refined_deck
+from fecm.problem.symmetry import symmetry_lines
 from fecm.simulation.job import ENOUGH
 from fecm.sweeps.job import checked_problem
 from fecm.sweeps.responses import plate_response
@@ -302,6 +303,11 @@ def _responses_in_region(
     """Return the nodes of a region and the gages' responses there, cached for other tables."""
     interval, unit, count = samples
     problem = checked_problem(deck)
+    if lines := " and ".join(map(str, symmetry_lines(deck, problem.mesh))):
+        raise StudyError(
+            f"locate needs the whole plate, and the deck has the line of symmetry {lines}: it "
+            "mirrors every force"
+        )
     mesh, plate = problem.mesh, moving_plate(problem.plate)
     rows = gage_rows(problem, numbers, plate)
     _check_symmetry(plate, rows, numbers, region)

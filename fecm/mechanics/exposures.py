@@ -22,12 +22,14 @@ from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.ply_stresses import ElementZone, PlyStresses, Zones, strains_of
 from fecm.mechanics.points import containing_elements
 from fecm.mechanics.strains import FLAT, Curvature, strain_of_deflection
+from fecm.mechanics.symmetry import Mirror
 
 Numbers = NDArray[np.int64]
 NOWHERE = -1  # state of a criterion without an exposure that counts
 # Exposures that differ by less than this share are equal, so that rounding decides neither which
 # exposure is the largest nor when.  kernels.c has the same constant.
 TIE = 1.0e-9
+ON_LINE = 1.0e-6  # distance of a point of the circle from a line of symmetry, over the radius
 
 
 @dataclass
@@ -179,6 +181,8 @@ class CircleStresses(PlyStresses):
         Laminates with the rows of their elements.
     initial, curvature, nonlinear, stretches
         As in :class:`~fecm.mechanics.ply_stresses.PlyStresses`.
+    mirrors : sequence of Mirror
+        Lines of symmetry, where the mean is taken with the mirrored element.
     """
 
     def __init__(
@@ -192,6 +196,7 @@ class CircleStresses(PlyStresses):
         curvature: Curvature = FLAT,
         nonlinear: bool = False,
         stretches: bool = True,
+        mirrors: Sequence[Mirror] = (),
     ) -> None:
         angles = np.arange(ANGLES) * (2.0 * np.pi / ANGLES)
         points = np.array(centre) + radius * np.column_stack([np.cos(angles), np.sin(angles)])
@@ -219,6 +224,7 @@ class CircleStresses(PlyStresses):
             self._means[point, entry] = 1.0
             rows[point] = row
         self._means /= self._means.sum(axis=1, keepdims=True)
+        self._mirrored = _mirrored(self.points, mirrors, radius)
         self.zones = [
             ElementZone.of(laminate, _points_in(rows, members)) for laminate, members in laminates
         ]
@@ -235,6 +241,8 @@ class CircleStresses(PlyStresses):
         """Return the strains of a field (numnp, 5) at the points, (n, 1, 6); gradients are NaN."""
         q = field[self._nodes]  # (entries, nodes, 5)
         values = (self._means @ (self._shapes @ q).reshape(len(q), -1)).reshape(-1, 3, 5)
+        if self._mirrored is not None:
+            values[self._mirrored] = 0.0
         slopes = values[:, 1:]
         strains = strains_of(np.concatenate([slopes[..., :2], -slopes[..., 3:]], axis=2))
         strains[:, :3] += values[:, :1, 2] * strain_of_deflection(self.curvature)
@@ -244,6 +252,22 @@ class CircleStresses(PlyStresses):
         if self.initial is not None:
             strains[:, :3] += self.initial
         return strains[:, None], np.full((len(strains), 2, 6), np.nan)
+
+
+def _mirrored(points: Floats, mirrors: Sequence[Mirror], radius: float) -> Bools | None:
+    """Return the values at points that a mirrored element cancels, (n, 3, 5); None without mirrors.
+
+    The values are each dof and its slopes in x and y. Across a line of symmetry the slopes of the
+    dofs that are even cancel.
+    """
+    if not mirrors:
+        return None
+    cancelled = np.zeros((len(points), 3, 5), dtype=bool)
+    for mirror in mirrors:
+        on_line = np.abs(points[:, mirror.axis] - mirror.place) <= ON_LINE * radius
+        is_even = np.isin(np.arange(5), mirror.odd, invert=True)
+        cancelled[:, 1 + mirror.axis] |= on_line[:, None] & is_even
+    return cancelled
 
 
 def _points_in(rows: Indices, members: Indices | slice) -> Indices | slice:

@@ -11,6 +11,7 @@ laminate.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,14 @@ from fecm.mechanics.plate import PlateModel
 TURNED = np.array([-1.0, -1.0, 1.0, -1.0, -1.0])
 # Tolerance of the positions of a node and its image, relative to the plate's size.
 TOLERANCE = 1.0e-9
+
+
+class Mirror(NamedTuple):
+    """Line of symmetry at which the elements of a part of a plate end."""
+
+    axis: int  # 0 for a line x = place, 1 for y = place
+    place: float
+    odd: tuple[int, int]  # dofs of which the mirror changes the sign, so that they are 0 on it
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ MANY = 2000  # meshes with more elements are drawn with fewer points per element
 
 
 def require_datasets(result: Result, name: str, *paths: str, padded: bool = False) -> list[Array]:
-    """Return datasets of a result.
+    """Return datasets of a result. Contact forces and energies are those of the whole plate.
 
     Raises LackingError if a dataset is empty or missing; the message names the macro that stores
     it. Raises PlotError if a dataset holds numbers that an axis can't show. `padded` allows NaN in
@@ -48,7 +48,7 @@ def require_datasets(result: Result, name: str, *paths: str, padded: bool = Fals
                 f"{path} of {name} holds numbers beyond ±{LARGEST:g}, infinities or NaN, which "
                 "can't be drawn"
             )
-    return [result[path] for path in paths]
+    return [result.whole(path) for path in paths]
 
 
 def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:

@@ -115,7 +115,7 @@ def force(
         sizes.append(measured.force)
     pound = style.scale_of(results, "force", sizes)
 
-    figure, axes = _draw_forces(drawn, pound, width)
+    figure, axes = _draw_forces(drawn, pound, width, _of_whole(results))
     _mark_thresholds(axes[0], limits, list(drawn), pound)
     time_axis(axes[-1], style.scale_of(results, "time", times), times)
     _mark_open_ends(axes[0], results, width)
@@ -134,9 +134,12 @@ def force(
 
 
 def _draw_forces(
-    drawn: Mapping[str, DrawnForces], pound: style.AxisScale, width: Width
+    drawn: Mapping[str, DrawnForces], pound: style.AxisScale, width: Width, whole: str
 ) -> tuple[Figure, list[Axes]]:
-    """Draw the forces of one result in one graph; of several results, transducers have a second."""
+    """Draw the forces of one result in one graph; of several results, transducers have a second.
+
+    `whole` ends the names of the axes.
+    """
     colours = style.colours()
     rigid = all(
         np.array_equal(forces_of_run.contact, forces_of_run.transducer)
@@ -148,7 +151,7 @@ def _draw_forces(
         axes[0].plot(forces.time, forces.contact, color=colours[0], label="contact force")
         if not rigid:
             axes[0].plot(forces.time, forces.transducer, color=colours[1], label="transducer")
-        pound.name(axes[0].yaxis, "Contact force" if rigid else "Force")
+        pound.name(axes[0].yaxis, f"{'Contact force' if rigid else 'Force'}{whole}")
         return figure, axes
 
     rows, tall = (1, 1.0) if rigid else (2, 0.65)
@@ -157,8 +160,14 @@ def _draw_forces(
         for ax, values in zip(axes, (forces.contact, forces.transducer), strict=False):
             ax.plot(forces.time, values, color=colour, label=name)
     for ax, text in zip(axes, ("Contact force", "Transducer"), strict=False):
-        pound.name(ax.yaxis, text)
+        pound.name(ax.yaxis, f"{text}{whole}")
     return figure, axes
+
+
+def _of_whole(results: Results) -> str:
+    """Return the words that forces and energies of a symmetric part are of the whole plate."""
+    is_part = any(result.symmetry_factor > 1 for result in results.values())
+    return ", whole plate" if is_part else ""
 
 
 def _mark_thresholds(
@@ -248,7 +257,7 @@ def loop(results: Results, *, against: Against | None = None, width: Width = "co
         axes.set_xlim(1.05 * touched.min(), 1.05 * touched.max())
     axes.set_ylim(bottom=0.0)
     length.name(axes.xaxis, label)
-    pound.name(axes.yaxis, "Contact force")
+    pound.name(axes.yaxis, f"Contact force{_of_whole(results)}")
     _mark_open_ends(axes, results, width)
     if len(drawn) > 1:
         style.lines_legend(figure, axes)
@@ -279,7 +288,7 @@ def energy(results: Results, *, width: Width = "column") -> Picture:
         for values, colour in zip((*columns, np.sum(columns, axis=0)), shades, strict=True):
             axes.plot(time, values, color=colour, ls=look)
     axes.set_ylim(bottom=0.0)
-    work.name(axes.yaxis, "Energy")
+    work.name(axes.yaxis, f"Energy{_of_whole(results)}")
     _mark_open_ends(axes, results, width)
     time_axis(axes, clock, times)
     handles = [Line2D([], [], color=c) for c in shades]

@@ -305,6 +305,7 @@ def _stresses(
                 curvature=plate.curvature,
                 nonlinear=plate.nonlinear,
                 stretches=stretches,
+                mirrors=[line.mirror for line in problem.symmetry.lines],
             )
             around = Around(
                 circle,

@@ -36,6 +36,7 @@ from fecm.problem.rules import (
     program,
     projectile,
     quadrature,
+    symmetry,
     time_step,
     units,
     zones,
@@ -231,7 +232,7 @@ def _check_run(checked: Problem, findings: Findings, sound: Callable[[], bool]) 
             apply(time_step.OF_CONTACT, findings, checked)
     if checked.has_impact:
         apply(projectile.WITHOUT_PROJECTILE, findings, checked)
-        apply(impact.OF_MESH, findings, checked)
+        apply((*impact.OF_MESH, *symmetry.OF_IMPACT), findings, checked)
         apply(gages.OF_POINT_FORCE, findings, checked)
 
 

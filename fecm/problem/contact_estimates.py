@@ -31,26 +31,27 @@ def wave_impedance(laminate: LaminateSection) -> float:
     return 8.0 * math.sqrt(laminate.mass * effective_rigidity(laminate))
 
 
-def expected_peak(deck: model.Deck, plate: PlateModel) -> float:
+def expected_peak(deck: model.Deck, plate: PlateModel, factor: int = 1) -> float:
     """Estimate the peak force; the estimate is high rather than low.
 
     It is the smaller of two values: the Hertz contact on a rigid target, k^(2/5) (5 m v^2/4)^(3/5),
     and the response of the plate, by the bending wave for a light projectile and the stiffness of a
-    clamped plate for a heavy one.
+    clamped plate for a heavy one. A deck of one of `factor` symmetric parts has its part of the
+    peak.
     """
     impact, law = deck.require(model.Impact), deck.require(model.Indentation)
     mass, v = build_projectile(deck).total_mass, np.abs(np.float64(impact.velocity))
     ratio = mass / plate.total_mass()
     rigid = law.k**0.4 * (1.25 * mass) ** 0.6 * v**1.2
-    impedance = max(map(wave_impedance, plate.laminates))
+    impedance = max(map(wave_impedance, plate.laminates)) / factor
     return float(min(rigid, impedance * v * np.sqrt(1.0 + CLAMPED * ratio)))
 
 
-def contact_stiffness(deck: model.Deck, plate: PlateModel) -> float:
+def contact_stiffness(deck: model.Deck, plate: PlateModel, factor: int = 1) -> float:
     """Return the larger tangent stiffness of loading (3-1) and unloading (3-3) at the peak."""
     law = build_constants(deck.require(model.Indentation))
     with np.errstate(all="ignore"):  # infinite where the unloading curve is a vertical line
-        force = np.float64(expected_peak(deck, plate))
+        force = np.float64(expected_peak(deck, plate, factor))
         peak = (force / law.k) ** (2.0 / 3.0)
         if not peak > 0.0:
             return 0.0
@@ -66,19 +67,24 @@ class ContactStep(NamedTuple):
 
 
 def contact_step(
-    deck: model.Deck, plate: PlateModel, contact: Floats | None, dt: float, bound: float
+    deck: model.Deck,
+    plate: PlateModel,
+    contact: Floats | None,
+    dt: float,
+    bound: float,
+    factor: int = 1,
 ) -> ContactStep | None:
     """Return the largest stable time step of plate and contact together; None without impact.
 
     `contact` is the distribution of a unit contact force over the dofs, (numnp, 5), or None.
     `bound` is a lower bound of the plate's critical time step. `dt` is the deck's time step, 0 for
-    0.9 of the critical one. The limit is computed only where the bound does not show that `dt` is
-    stable.
+    0.9 of the critical one. `factor` is the number of symmetric parts of which the deck has one.
+    The limit is computed only where the bound does not show that `dt` is stable.
     """
     if contact is None:
         return None
     weights = contact[plate.mesh.equations > 0]
-    stiffness = contact_stiffness(deck, plate)
+    stiffness = contact_stiffness(deck, plate, factor)
     projectile = build_projectile(deck)
     rigid = isinstance(projectile, RigidMass)
     tip = projectile.total_mass if rigid else float(projectile.mass()[0])

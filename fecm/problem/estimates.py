@@ -14,7 +14,7 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm.deck import model
-from fecm.deck.model import Impact, Indentation
+from fecm.deck.model import Impact
 from fecm.mechanics.mesh import longest_sides
 from fecm.mechanics.quick_models import (
     StaticCurve,
@@ -130,15 +130,13 @@ def static_deflection(problem: Problem) -> float:
     problem : Problem
         Problem of an impact without errors.
     """
-    contact = problem.contact
-    assert contact is not None  # the program has impact steps
-    mass, velocity = build_projectile(problem.deck).total_mass, _velocity(problem)
-    stiffness = static_stiffness(problem.moving_plate, contact)
+    mass, velocity = problem.projectile_mass, _velocity(problem)
+    stiffness = whole_stiffness(problem)
     if not (math.isfinite(stiffness) and velocity > 0.0):
         return math.nan
     wave = 2.0 * mass * velocity / wave_impedance(problem.laminate)
     try:
-        peak = static_peak(mass, velocity, _coefficient(problem), stiffness)
+        peak = static_peak(mass, velocity, problem.contact_coefficient, stiffness)
     except OverflowError:  # the checks doubt such a k
         return math.nan
     return min(wave, peak / stiffness)
@@ -147,7 +145,7 @@ def static_deflection(problem: Problem) -> float:
 def nonlinear_curve(problem: Problem, energy: float, force: float) -> StaticCurve:
     """Return the static curve of a nonlinear plate up to an energy and a force.
 
-    A force of NaN sets no limit.
+    A force of NaN sets no limit. Energy, force and curve are those of the whole plate.
 
     Raises NoCurveError if the plate has no such curve.
     """
@@ -155,23 +153,34 @@ def nonlinear_curve(problem: Problem, energy: float, force: float) -> StaticCurv
     assert contact is not None  # the program has impact steps
     if problem.mesh.forces.any():
         raise NoCurveError(f"{NO_CURVE}: the deck has FORC")
-    stiffness = static_stiffness(problem.moving_plate, contact)
+    stiffness, factor = whole_stiffness(problem), problem.symmetry.factor
     if math.isnan(stiffness):
         raise NoCurveError(f"{NO_CURVE}: the plate is free")
     linear = max(math.sqrt(2.0 * energy / stiffness), np.nan_to_num(force) / stiffness)
     step = min(linear / CURVE_STEPS, LONGEST_STEP * problem.laminate.thickness)
 
     def enough(_: float, reached: float, work: float) -> bool:
-        return work >= energy and not reached < force
+        return factor * work >= energy and not factor * reached < force
 
     try:
         curve = static_curve(problem.moving_plate, contact, step, enough)
     except (SingularStiffnessError, ConvergenceError) as error:
         raise NoCurveError(f"{NO_CURVE}: {error}") from None
     if (falls := np.diff(curve.force) < 0.0).any():
-        limit = float(curve.force[np.argmax(falls)])
+        limit = factor * float(curve.force[np.argmax(falls)])
         raise NoCurveError(f"{NO_CURVE}: the panel snaps through at the force {limit:.4g}")
-    return curve
+    if factor == 1:
+        return curve
+    return curve._replace(
+        force=factor * curve.force, stiffness=factor * curve.stiffness, work=factor * curve.work
+    )
+
+
+def whole_stiffness(problem: Problem) -> float:
+    """Return the static stiffness of the whole plate under its load; NaN for a free plate."""
+    assert problem.contact is not None  # the program has impact steps
+    factor = problem.symmetry.factor
+    return factor * static_stiffness(problem.moving_plate, problem.contact)
 
 
 def contact_duration(problem: Problem) -> float:
@@ -179,20 +188,17 @@ def contact_duration(problem: Problem) -> float:
 
     A nonlinear plate has its static curve if there is one, and is taken as linear otherwise.
     """
-    contact = problem.contact
-    assert contact is not None
-    mass, velocity = build_projectile(problem.deck).total_mass, _velocity(problem)
+    mass, velocity, k = problem.projectile_mass, _velocity(problem), problem.contact_coefficient
     if problem.plate.nonlinear and velocity > 0.0:
         with suppress(NoCurveError, OverflowError):
             curve = nonlinear_curve(problem, 0.5 * mass * velocity**2, math.nan)
             bare = contact_time_on_curve(mass, velocity, math.inf, curve)
-            whole = contact_time_on_curve(mass, velocity, _coefficient(problem), curve)
+            whole = contact_time_on_curve(mass, velocity, k, curve)
             return _rounded(max(HALF_PERIODS * bare, CONTACT_TIMES * whole))
-    stiffness = static_stiffness(problem.moving_plate, contact)
+    stiffness = whole_stiffness(problem)
     duration = HALF_PERIODS * math.pi * math.sqrt(mass / stiffness)
     if velocity > 0.0:
         with suppress(OverflowError):  # the checks doubt such a k
-            k = _coefficient(problem)
             duration = max(
                 duration, CONTACT_TIMES * static_plate(mass, velocity, k, stiffness).duration
             )
@@ -201,11 +207,6 @@ def contact_duration(problem: Problem) -> float:
 
 def _velocity(problem: Problem) -> float:
     return problem.deck.require(Impact).velocity
-
-
-def _coefficient(problem: Problem) -> float:
-    """Return the contact coefficient k, force/length^1.5."""
-    return problem.deck.require(Indentation).k
 
 
 def _rounded(duration: float) -> float:

@@ -35,7 +35,14 @@ from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.contact_estimates import ContactStep, contact_step
 from fecm.problem.outline import Span, outside_supports, unsupported
-from fecm.problem.parts import build_plate, residuals_of_deck, rules, strengths_of_deck
+from fecm.problem.parts import (
+    build_plate,
+    build_projectile,
+    residuals_of_deck,
+    rules,
+    strengths_of_deck,
+)
+from fecm.problem.symmetry import Symmetry, symmetry_of
 from fecm.results.validity import Judge, in_plane_of
 
 if TYPE_CHECKING:
@@ -200,7 +207,8 @@ class Problem:
         bound = self.safe_time_step
         steps = (macro.value for macro in self.deck.macros if macro.word == "DT")
         largest = max(dt or SAFE * bound for dt in steps)
-        return contact_step(self.deck, self.moving_plate, self.contact, largest, bound)
+        factor = self.symmetry.factor
+        return contact_step(self.deck, self.moving_plate, self.contact, largest, bound, factor)
 
     @cached_property
     def has_impact(self) -> bool:
@@ -383,6 +391,26 @@ class Problem:
         return max(exposures, key=lambda pair: pair[0].exposure, default=None)
 
     @cached_property
+    def symmetry(self) -> Symmetry:
+        """Lines of symmetry of the plate; none without an impact."""
+        return symmetry_of(self.deck, self.mesh) if self.has_impact else Symmetry()
+
+    @property
+    def projectile_mass(self) -> float:
+        """Mass of the projectile that hits the whole plate."""
+        return self.symmetry.factor * build_projectile(self.deck).total_mass
+
+    @property
+    def plate_mass(self) -> float:
+        """Mass of the whole plate."""
+        return self.symmetry.factor * self.plate.total_mass()
+
+    @property
+    def contact_coefficient(self) -> float:
+        """Coefficient k of the contact with the whole plate, force/length^1.5."""
+        return self.symmetry.factor * self.deck.require(model.Indentation).k
+
+    @cached_property
     def judge(self) -> Judge:
         """Judge of the validity of an impact on the plate."""
         mobility = 0.0
@@ -390,7 +418,7 @@ class Problem:
             mobility = self.moving_plate.rigid_mobility(self.contact[:, W])
         return Judge(
             self.laminate.thickness,
-            in_plane_of(self.mesh.codes, self.mesh.coordinates),
+            in_plane_of(self.mesh.codes, self.mesh.coordinates, self.symmetry.cut),
             mobility,
             preloaded=self.plate.is_preloaded,
             curved=self.plate.is_curved,

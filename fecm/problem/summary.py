@@ -19,16 +19,16 @@ from fecm.deck.macros import flat
 from fecm.deck.model import Cure, Impact, Shear
 from fecm.deck.units import MASS, MODULUS, mass_in_si, quantity, unit_names, unit_of
 from fecm.mechanics.interpolation import W
-from fecm.mechanics.plate import PlateModel, UnsoundPlateError
+from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.solutions import FAR, SingularStiffnessError, compliance
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.strains import midplane_height
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.estimates import MOST_SOLVED, format_mesh_error, resolution
-from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
 from fecm.problem.rules.preload import FEWEST_ELEMENTS
+from fecm.results.stored import whole_plate
 
 ROOM = 0.6  # share of the critical time step below which the step that DT 0 takes is shown
 LABEL_WIDTH = 20  # of the lines of a summary, at least
@@ -138,6 +138,11 @@ class ProblemSummary:
         Change of temperature of CURE, kelvin; None without CURE.
     threshold : float or None
         Delamination threshold, force; None without one.
+    symmetry_factor : int
+        Number of equal parts of the plate of which the deck has one: 1, 2 or 4. Masses and energy
+        are of the whole plate.
+    symmetry_lines : str
+        Lines of symmetry through the impact node; empty without.
     """
 
     title: str
@@ -173,6 +178,8 @@ class ProblemSummary:
     energy: FiniteFloat | None
     cure: FiniteFloat | None
     threshold: FiniteFloat | None
+    symmetry_factor: int
+    symmetry_lines: str
 
     def to_dict(self) -> dict[str, object]:
         """Return plain values, for JSON."""
@@ -248,13 +255,15 @@ def _plate_rows(summary: ProblemSummary) -> Iterator[Row]:
 
 
 def _impact_rows(summary: ProblemSummary) -> Iterator[Row]:
-    """Yield rows about masses, velocity and energy."""
+    """Yield rows about masses, velocity and energy, which are those of the whole plate."""
 
     def mass_text(mass: float) -> str:
         text = f"{significant(mass)} {unit_of(MASS, summary.units)}".rstrip()
         in_si = mass_in_si(mass, summary.units)
         return f"{text} ({in_si})" if in_si else text
 
+    if text := whole_plate(summary.symmetry_factor):
+        yield ("symmetry", f"{summary.symmetry_lines}, {text}")
     yield ("plate mass", mass_text(summary.plate_mass))
     if summary.velocity is not None and summary.energy is not None:
         yield ("projectile mass", mass_text(summary.projectile_mass))
@@ -305,7 +314,7 @@ def deck_summary(problem: Problem) -> ProblemSummary:
     with suppress(UnsoundPlateError):  # the check reports it if the program takes steps
         critical = problem.critical_time_step
     without_equilibrium = leaves_out_equilibrium(problem)
-    mass = build_projectile(deck).total_mass
+    mass = problem.projectile_mass
     velocity = deck.require(Impact).velocity if problem.has_impact else None
     cure = deck.last(Cure)
     return ProblemSummary(
@@ -320,12 +329,12 @@ def deck_summary(problem: Problem) -> ProblemSummary:
         free_in_plane=int((plate.mesh.codes[:, :W] == 0).all(axis=1).sum()),
         preload=plate.preload,
         curvature=plate.curvature,
-        rise=_rise(plate) if plate.is_curved else 0.0,
+        rise=rise_of(problem) if plate.is_curved else 0.0,
         A=laminate.A,
         B=laminate.B,
         D=laminate.D,
         shear=laminate.shear,
-        plate_mass=plate.total_mass(),
+        plate_mass=problem.plate_mass,
         projectile_mass=mass,  # even without impact
         critical_time_step=critical,
         buckling_factor=problem.buckling_factor if plate.is_compressed else None,
@@ -342,12 +351,15 @@ def deck_summary(problem: Problem) -> ProblemSummary:
         energy=None if velocity is None else 0.5 * mass * velocity * velocity,
         cure=None if cure is None else cure.delta_t,
         threshold=None if problem.threshold is None else problem.threshold.force,
+        symmetry_factor=problem.symmetry.factor,
+        symmetry_lines=problem.symmetry.places,
     )
 
 
-def _rise(plate: PlateModel) -> float:
-    """Return the height of a curved panel, length."""
-    return float(np.ptp(midplane_height(plate.mesh.coordinates[plate.mesh.used], plate.curvature)))
+def rise_of(problem: Problem) -> float:
+    """Return the height of a curved panel, of the whole plate, length."""
+    places = problem.symmetry.unfolded(problem.mesh.coordinates[problem.mesh.used])
+    return float(np.ptp(midplane_height(places, problem.plate.curvature)))
 
 
 def _matrix_rows(label: str, matrix: Floats, unit: str, size: float) -> Iterator[Row]:

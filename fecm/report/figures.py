@@ -91,7 +91,7 @@ def _with_peaks(kind: PictureKind, caption: str, results: Mapping[str, Result]) 
         return caption
     peaks = []
     for name, result in results.items():
-        if "history/force" in result and len(force := result["history/force"]):
+        if "history/force" in result and len(force := result.whole("history/force")):
             size = quantity(float(force.max()), result.unit("force"))
             peaks.append(f"{name}: {size}" if len(results) > 1 else size)
     return f"{caption[:-1]}; largest force {', '.join(peaks)}." if peaks else caption

@@ -29,6 +29,7 @@ from fecm.deck.units import (
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
+from fecm.problem.summary import rise_of
 from fecm.report.content import (
     PageBlock,
     PagePicture,
@@ -38,6 +39,7 @@ from fecm.report.content import (
 from fecm.report.figures import inside, stack
 from fecm.results.result import Result
 from fecm.results.run_metrics import impact_energy
+from fecm.results.stored import whole_plate
 from fecm.results.summary import radii_of
 
 PLY = (
@@ -68,9 +70,10 @@ def of_problem(result: Result, problem: Problem) -> Iterator[PageBlock]:
 
 
 def plate_extent(problem: Problem) -> str:
-    """Return the extent of the plate as a text."""
+    """Return the extent of the plate as a text, of the whole plate for a symmetric part."""
     unit = unit_of("length", unit_names(problem.deck))
-    low, high = (f(problem.mesh.coordinates[:, :2], axis=0) for f in (np.min, np.max))
+    places = problem.symmetry.unfolded(problem.mesh.coordinates[:, :2])
+    low, high = (f(places, axis=0) for f in (np.min, np.max))
     a, b = (f"{side:.5g}" for side in high - low)
     return f"{a} × {b} {unit}".rstrip()
 
@@ -82,6 +85,8 @@ def _plate(result: Result, problem: Problem) -> Iterator[Row]:
     deck, plate = problem.deck, problem.plate
     in_units = partial(_in_units, deck)
     yield "extent", plate_extent(problem)
+    if text := whole_plate(problem.symmetry.factor):
+        yield "symmetry", f"{problem.symmetry.places}, {text}"
     yield "thickness", in_units(problem.laminate.thickness, "length")
     control = deck.control
     yield "mesh", f"{control.numel} elements of up to {control.nen} nodes, {control.numnp} nodes"
@@ -92,10 +97,9 @@ def _plate(result: Result, problem: Problem) -> Iterator[Row]:
     for axis, radius in radii_of(result).items():
         yield f"radius R{axis}", in_units(radius, "length")
     if "mesh/z" in result:
-        rise = in_units(float(np.ptp(result["mesh/z"])), "length")
-        yield "rise of the curved panel", rise
+        yield "rise of the curved panel", in_units(rise_of(problem), "length")
     yield "kinematics", "von Kármán: stretches as it bends" if plate.nonlinear else "linear"
-    mass = plate.total_mass()
+    mass = problem.plate_mass
     yield "mass", ShownNumber(mass, _mass(deck, mass))
     for name, force in zip(("N0x", "N0y", "N0xy"), plate.preload, strict=True):
         if force:
@@ -162,7 +166,7 @@ class Impactor(NamedTuple):
 
 
 def impactor(result: Result, deck: model.Deck) -> Impactor | None:
-    """Return the projectile of a run; None without impact.
+    """Return the projectile of a run, as it hits the whole plate; None without impact.
 
     Its mass follows from the initial energy.
     """
@@ -170,7 +174,7 @@ def impactor(result: Result, deck: model.Deck) -> Impactor | None:
     if impact is None:
         return None
     projectile = build_projectile(deck)
-    mass, velocity = projectile.total_mass, impact.velocity
+    mass, velocity = result.symmetry_factor * projectile.total_mass, impact.velocity
     energy = impact_energy(result)
     if math.isfinite(energy) and velocity:
         mass = 2.0 * energy / velocity**2
@@ -194,7 +198,11 @@ def _impact(result: Result, deck: model.Deck) -> Iterator[Row]:
         yield "contact law", f"{user_law}, instead of EXPE"
     else:
         yield "contact law", "equation 3-7 (ACR)" if law.word else "equation 3-8"
-        for name, value, dimension in zip(law.names(), law.values(), LAW, strict=True):
+        factors = [result.symmetry_factor, 1, 1, 1]
+        for name, part, factor, dimension in zip(
+            law.names(), law.values(), factors, LAW, strict=True
+        ):
+            value = factor * part
             if value or dimension == COEFFICIENT:
                 yield name, in_units(value, dimension)
     if (patch := deck.last(model.Patch)) is not None:

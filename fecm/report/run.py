@@ -42,6 +42,7 @@ from fecm.results.exposures import (
 )
 from fecm.results.metrics import INTEGERS, METRICS
 from fecm.results.result import Result
+from fecm.results.stored import whole_plate
 from fecm.results.summary import (
     UNDECIDED,
     elastic_doubt,
@@ -76,7 +77,12 @@ def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> Repor
     if len(results) == 1:
         ((name, result),) = results.items()
         title = result.title or name
-        verdict = [_sentence(result, problems[name]), WORDS[level]]
+        symmetry = whole_plate(result.symmetry_factor)
+        verdict = [
+            _sentence(result, problems[name]),
+            *([f"{symmetry[0].upper()}{symmetry[1:]}."] if symmetry else []),
+            WORDS[level],
+        ]
         body = _single(name, result, *loaded[name], judged[name])
     else:
         title = f"{len(results)} impacts: {', '.join(results)}"
@@ -154,6 +160,7 @@ def _model_row(result: Result, problem: Problem | None) -> dict[str, Cell]:
     layers = deck.require(model.Material).layers
     row: dict[str, Cell] = {
         "plate": plate_extent(problem),
+        **({"symmetry": text} if (text := whole_plate(result.symmetry_factor)) else {}),
         "thickness": number_with_unit(problem.laminate.thickness, unit_of("length", units)),
         "layup": layup_text([layer.angle for layer in layers]),
         "kinematics": "von Kármán" if problem.plate.nonlinear else "linear",
@@ -177,7 +184,7 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     in_units = partial(_format_quantity, result)
     if "history/force" not in result or not len(result["history/force"]):
         return "No impact: see Results."
-    force, time = result["history/force"], result["history/time"]
+    force, time = result.whole("history/force"), result["history/time"]
     peak = int(force.argmax())
     parts = []
     if force[peak] > 0.0:
@@ -275,7 +282,7 @@ def _metrics(results: Mapping[str, Result]) -> list[PageBlock]:
 def _elastic_peaks(results: Mapping[str, Result]) -> str:
     """List, in brackets, the peaks that are elastic predictions only."""
     doubts = {
-        name: elastic_doubt(result, float(result["history/force"].max(initial=0.0)))
+        name: elastic_doubt(result, float(result.whole("history/force").max(initial=0.0)))
         for name, result in results.items()
         if "history/force" in result
     }
@@ -289,7 +296,8 @@ def _lower_bound(result: Result) -> Cell:
     """Return the largest force of a run whose peak is open."""
     if result.end not in UNDECIDED:
         return UNKNOWN
-    return number_with_unit(float(result["history/force"].max()), unit_of("force", result.units))
+    force = float(result.whole("history/force").max())
+    return number_with_unit(force, unit_of("force", result.units))
 
 
 def _threshold(result: Result) -> list[PageBlock]:

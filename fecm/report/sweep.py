@@ -33,7 +33,7 @@ from fecm.results.validity import MEANING, Reason, counted
 from fecm.sweeps.random import Design
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.statistics import QUANTILES, RandomResult
-from fecm.sweeps.summary import MAIN, chance, sweep_verdict
+from fecm.sweeps.summary import MAIN, chance, sweep_verdict, symmetry_text
 
 FOUND = "found_velocity"
 PEAK = "peak_force"
@@ -69,6 +69,8 @@ def _sentences(sweep: SweepResult) -> Iterator[str]:
     what = FOUND if FOUND in sweep.summary else PEAK
     names = ", ".join(sweep.cases) or "nothing"
     yield f"A sweep over {names}; {sweep_verdict(sweep)}."
+    if text := symmetry_text(sweep):
+        yield f"{text[0].upper()}{text[1:]}."
     if (random := sweep.random) is not None and not random.combinations:
         exceedance = random.exceedance
         for row, (name, limit) in enumerate(

@@ -199,7 +199,8 @@ def _threshold(result: Result) -> Iterator[Judgement]:
     if not result.threshold:
         yield Judgement(TrustLevel.UNJUDGED, "delamination", UNKNOWN, "the deck has no DELA")
         return
-    ratio = float(result["history/force"].max(initial=0.0)) / float(result.threshold["force"])
+    largest = float(result.whole("history/force").max(initial=0.0))
+    ratio = largest / float(result.threshold["force"])
     crossed = ratio > CROSSED
     is_open = result.end in UNDECIDED and not crossed
     words = "the run is elastic above the threshold" if crossed else SO_FAR if is_open else ""
@@ -252,7 +253,8 @@ def _numerical(result: Result) -> Iterator[Judgement]:
     """Judge the energy balance and the contact iteration."""
     energy = impact_energy(result)
     if "energy/balance_error" in result and energy > 0.0:
-        worst = float(np.abs(result["energy/balance_error"]).max(initial=0.0)) / energy
+        error = np.abs(result.whole("energy/balance_error"))
+        worst = float(error.max(initial=0.0)) / energy
         level = TrustLevel.WITHIN if worst < BALANCED else TrustLevel.DOUBTFUL
         size: Cell = ShownNumber(worst, f"{worst:.2g}")
         words = "largest error, of the energy put in"

@@ -162,7 +162,7 @@ def _from_file(
 
 def _doubt_trigger(stored: Stored, measured: Measurement, clock: Floats) -> None:
     """Warn if the measured force rises much earlier or later than the force of the result."""
-    force = np.append(0.0, stored[f"history/{measured.column}"])
+    force = np.append(0.0, stored.whole(f"history/{measured.column}"))
     if force.max() <= 0.0 or measured.force.max() <= 0.0:
         return
     above = force >= 0.5 * force.max()
@@ -177,7 +177,7 @@ def _doubt_trigger(stored: Stored, measured: Measurement, clock: Floats) -> None
 
 
 def compare_force(stored: Stored, measured: Measurement) -> Comparison:
-    """Compare the force of a result with a measured force, at the measured times of the run.
+    """Compare the force on the whole plate with a measured force, at the measured times of the run.
 
     Raises StudyError if the result has no impact, or if fewer than two times are in both.
     """
@@ -192,7 +192,8 @@ def compare_force(stored: Stored, measured: Measurement) -> Comparison:
             "check its unit of time"
         )
     time, force = measured.time[there], measured.force[there]
-    interpolated = np.interp(time, clock, np.append(0.0, stored[f"history/{measured.column}"]))
+    computed = np.append(0.0, stored.whole(f"history/{measured.column}"))
+    interpolated = np.interp(time, clock, computed)
     _doubt_trigger(stored, measured, clock)
     weights = 0.5 * (np.diff(time, prepend=time[0]) + np.diff(time, append=time[-1]))
     varies = np.ptp(interpolated) > 0.0 and np.ptp(force) > 0.0

@@ -387,7 +387,7 @@ def threshold_energy(stored: Stored) -> float:
 
 
 class _History(NamedTuple):
-    """Contact force and its work on the plate at every step, from rest; NaN without impact."""
+    """Contact force on the whole plate and its work at every step; NaN without impact."""
 
     time: Floats
     force: Floats
@@ -399,7 +399,7 @@ def _history(stored: Stored) -> _History:
         unknown = np.full(1, math.nan)
         return _History(np.zeros(1), unknown, unknown)
     time, force, tip = (
-        np.concatenate([[0.0], stored[f"history/{name}"]])
+        np.concatenate([[0.0], stored.whole(f"history/{name}")])
         for name in ("time", "force", "displacement")
     )
     means = 0.5 * (force[1:] + force[:-1])

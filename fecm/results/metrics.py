@@ -54,6 +54,8 @@ SUMMARY = {
         "force*length",
     ),
 }
+# Dimensions of quantities of which a symmetric part has its share.
+SHARED = ("force", "force*length", "force*time")
 THRESHOLD_FORCE = "threshold_force"
 # Metrics of decks with a delamination threshold.
 THRESHOLD = {
@@ -125,12 +127,27 @@ HIT = {
     "hit_x": Quantity("x of the impact node or of the patch", "length"),
     "hit_y": Quantity("y of the impact node or of the patch", "length"),
 }
+# Of decks of a half or a quarter of a plate.
+FACTOR = "symmetry_factor"
+FACTORS = {
+    FACTOR: Quantity("number of equal parts of the plate of which the deck has one"),
+}
 RATIO = "deflection_ratio"
 RATIOS = {
     RATIO: Quantity("largest displacement of the plate under the load over its thickness"),
 }
 # All metrics of a sweep.  Gages have one metric each; its name begins with GAGE.
-COLUMNS = {**METRICS, **FOUND, **FOUND_BAND, **EXPOSURES, **BAND, **EVALUATIONS, **HIT, **RATIOS}
+COLUMNS = {
+    **METRICS,
+    **FOUND,
+    **FOUND_BAND,
+    **EXPOSURES,
+    **BAND,
+    **EVALUATIONS,
+    **HIT,
+    **RATIOS,
+    **FACTORS,
+}
 GAGE = "gage_"
 # Columns of texts: whether a case was run, and whether its result is valid.
 STATUS = "status"
@@ -176,7 +193,8 @@ class Metrics(NamedTuple):
 
     columns: dict[str, Floats]  # (cases,) each; NaN where the end of the case has not decided them
     end: Texts  # (cases,): state of the contact at the end, :class:`~fecm.results.end.End`
-    reached: Floats  # (cases,): largest contact force up to the end, a lower bound of the peak
+    # (cases,): largest contact force of the whole plate up to the end, a lower bound of the peak.
+    reached: Floats
     last: LastContact
     plate: Deflection
     is_held: bool  # whether supports hold the plate
@@ -195,6 +213,7 @@ def impact_metrics(
     plate: Deflection,
     threshold: float | Floats | None = None,
     mobility: float = 0.0,
+    factor: int = 1,
 ) -> Metrics:
     """Summarise many cases from their contact forces.
 
@@ -202,11 +221,13 @@ def impact_metrics(
     :data:`SUMMARY`; with a delamination threshold (force, or (cases,)) also the names of
     :data:`THRESHOLD`. `plate` is the motion of the plate under the load, `mobility` (1/mass) the
     mobility of its rigid motion; see :class:`~fecm.results.validity.Judge`. Values that the end of
-    a case has not decided are NaN. If a case ends in contact, only the peaks can be decided, and
+    a case has not decided are NaN. Forces, masses and energies are those of one of `factor`
+    symmetric parts; the threshold, and the forces and energies returned, are those of the whole
+    plate. If a case ends in contact, only the peaks can be decided, and
     only if they have passed and the projectile leaves.
     """
     limit = None if threshold is None else np.broadcast_to(threshold, force.shape[1])
-    of_forces = _from_forces(force, times, limit)
+    of_forces = _from_forces(force, times, None if limit is None else limit / factor)
     mass, velocity = (np.broadcast_to(v, force.shape[1]) for v in projectiles)
     impulse, reached, met = of_forces.impulse, of_forces.reached, of_forces.met
     rebound = impulse / mass - velocity
@@ -245,6 +266,10 @@ def impact_metrics(
         "energy_absorbed": where(finished, 0.5 * mass * (velocity**2 - rebound**2)),
         "contact_loop": where(finished, indentation.work),
     }
+    for name in columns:
+        if SUMMARY[name].dimension in SHARED:
+            columns[name] = factor * columns[name]
+    reached = factor * reached
     if limit is not None:
         columns[THRESHOLD_FORCE] = limit.copy()
         columns["threshold_margin"] = where(peak_is_known, 1.0 - reached / limit)

@@ -125,7 +125,12 @@ def start_w_of(stored: Stored) -> float:
 
 
 def impact_energy(stored: Stored) -> float:
-    """Return the energy of the projectile before the impact, without energy of a static load."""
+    """Return the energy of the impact on the whole plate, without energy of a static load."""
+    return stored.symmetry_factor * _energy_of_part(stored)
+
+
+def _energy_of_part(stored: Stored) -> float:
+    """Return the energy of the projectile of the deck before the impact."""
     energy = stored.attributes_of("energy")
     return _number(energy.get("initial")) - _number(energy.get(INITIAL_PLATE, 0.0))
 
@@ -159,7 +164,7 @@ def _summarised(stored: Stored) -> Metrics | None:
         permanent=np.array([_number(history.get("permanent_indentation"))]),
         work=stored["energy/contact_work"][-1:],
     )
-    initial = impact_energy(stored)
+    initial = _energy_of_part(stored)
     velocity = np.float64(_impact_velocity(stored))
     with np.errstate(all="ignore"):
         return impact_metrics(
@@ -170,6 +175,7 @@ def _summarised(stored: Stored) -> Metrics | None:
             deflection_of(stored),
             threshold=_number(stored.threshold.get("force")) if stored.threshold else None,
             mobility=_number(history.get(MOBILITY, 0.0)),
+            factor=stored.symmetry_factor,
         )
 
 
@@ -197,7 +203,7 @@ def deflection_of(stored: Stored) -> Deflection:
         stored["history/plate_w"],
         stored["history/time"],
         energy,
-        impact_energy(stored),
+        _energy_of_part(stored),
         start=start_w_of(stored),
         rest=0.0 if rest is None else _number(rest),
     )

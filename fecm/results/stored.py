@@ -17,7 +17,7 @@ from fecm.deck.model import Deck
 from fecm.deck.reader import Reader
 from fecm.deck.units import declared_units, unit_of
 from fecm.results.groups import Attributes, NotStoredError, check_name, not_stored
-from fecm.results.metrics import METRICS, VALIDITY
+from fecm.results.metrics import FACTOR, METRICS, SHARED, VALIDITY
 from fecm.results.schema import KINEMATICS, Kinematics, dataset_of
 
 BLOCK = 4_000_000  # bytes
@@ -25,6 +25,30 @@ ONE_RESULT = (
     "a result has datasets by name, as in result['force']; fecm.run_one returns one result, and "
     "fecm.run a list only for a deck with several problems"
 )
+# Groups whose forces and energies belong to the part. Elsewhere a force is one per length.
+OF_PART = ("history", "tape9", "energy")
+MEMBRANE_ENERGIES = tuple(
+    f"membrane/{name}" for name in ("energy", "strain_energy", "preload_energy")
+)
+
+
+PARTS = {2: "half", 4: "quarter"}  # names of symmetric parts by their number
+
+
+def whole_plate(factor: int) -> str:
+    """Say what a symmetric part and its numbers are; empty for a whole plate.
+
+    Examples
+    --------
+    >>> whole_plate(2)
+    "half model: forces, energies and masses are those of the whole plate, 2 times the model's"
+    """
+    if factor == 1:
+        return ""
+    return (
+        f"{PARTS[factor]} model: forces, energies and masses are those of the whole plate, "
+        f"{factor} times the model's"
+    )
 
 
 def row_blocks(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
@@ -96,6 +120,16 @@ class Stored:
         return self._texts("slips")
 
     @property
+    def symmetry_factor(self) -> int:
+        """Number of equal parts of the plate of which the deck has one: 1, 2 or 4.
+
+        Datasets are those of the deck's part. Metrics, threshold and summary are those of the whole
+        plate, whose forces and energies are this factor times those of the part.
+        """
+        factor = self.attributes.get(FACTOR)
+        return int(factor) if factor in (2, 4) else 1
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """Reasons to doubt the result."""
         return self._texts("notes")
@@ -160,6 +194,27 @@ class Stored:
             return unit_of(METRICS[name].dimension, self.units)
         dataset = dataset_of(self._stored(name), rank=0)
         return "" if dataset is None else unit_of(dataset.dimension, self.units)
+
+    def whole(self, name: str) -> Array:
+        """Return a dataset of the whole plate: forces and energies times the symmetry factor.
+
+        Parameters
+        ----------
+        name : str
+            Path of the dataset; a column of the history also by its name alone.
+
+        Raises
+        ------
+        NotStoredError
+            If it is not stored; a KeyError.
+        """
+        path = self._stored(name)
+        dataset = dataset_of(path, rank=0)
+        is_of_part = path.partition("/")[0] in OF_PART or path in MEMBRANE_ENERGIES
+        is_shared = is_of_part and dataset is not None and dataset.dimension in SHARED
+        if self.symmetry_factor == 1 or not is_shared:
+            return self[name]
+        return read_only(self.symmetry_factor * self[name])
 
     def attributes_of(self, group: str) -> dict[str, Any]:
         """Return the attributes of a group; empty without the group."""

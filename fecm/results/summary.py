@@ -28,7 +28,7 @@ from fecm.results.groups import GROUPS
 from fecm.results.metrics import INITIAL_PLATE
 from fecm.results.run_metrics import end_of, impact_energy, metrics_of, start_w_of
 from fecm.results.schema import DATASETS
-from fecm.results.stored import Stored, row_blocks
+from fecm.results.stored import Stored, row_blocks, whole_plate
 from fecm.results.validity import CROSSED
 
 if TYPE_CHECKING:
@@ -185,6 +185,8 @@ def _run_rows(result: Stored) -> list[Row]:
         for name, what, card in OWN_PARTS
         if name in result.attributes
     ]
+    if text := whole_plate(result.symmetry_factor):
+        lines.append(("symmetry", text))
     clock = "history/time" if "history/force" in result else "energy/time"
     if clock in result:
         time = result[clock]
@@ -206,6 +208,7 @@ def _run_rows(result: Stored) -> list[Row]:
             lines.append(_search("the threshold", "peak_force=threshold"))
     lines += _exposures(result)
     if "failure/x" in result and (count := np.count_nonzero(result["failure/under_load"])):
+        count *= result.symmetry_factor
         lines.append(("left out", f"{count} points under the load or at corners of supports"))
     if "modes/angular_frequency" in result:
         frequencies = result["modes/angular_frequency"]
@@ -230,15 +233,20 @@ def radii_of(result: Stored) -> dict[str, float]:
 
 
 def _curved(result: Stored) -> list[Row]:
-    """Return the row of the radii and the rise of a curved panel."""
+    """Return the row of the radii and the rise of a curved panel.
+
+    The rise of a symmetric part is not that of the whole plate.
+    """
     if "mesh/z" not in result:
         return []
     named = [
         f"R{axis} {_quantity(result, radius, 'length', DECK_DIGITS)}"
         for axis, radius in radii_of(result).items()
     ]
-    rise = _quantity(result, float(np.ptp(result["mesh/z"])), "length", DECK_DIGITS)
-    return [("curved panel", ", ".join([*named, f"rise {rise}"]))]
+    if result.symmetry_factor == 1:
+        rise = _quantity(result, float(np.ptp(result["mesh/z"])), "length", DECK_DIGITS)
+        named.append(f"rise {rise}")
+    return [("curved panel", ", ".join(named))]
 
 
 def _preload(result: Stored) -> list[Row]:
@@ -352,13 +360,15 @@ def _exposure(result: Stored, largest: LargestExposure) -> str:
     return (
         f"{least}{largest.exposure:.4g}: {largest.mode}, "
         f"{largest.where} at ({significant(largest.x)}, {significant(largest.y)}), "
-        f"time {_quantity(result, largest.time, 'time')}{_mirrors(largest)}{_band(largest)}"
+        f"time {_quantity(result, largest.time, 'time')}{_mirrors(result, largest)}{_band(largest)}"
     )
 
 
-def _mirrors(largest: LargestExposure) -> str:
+def _mirrors(result: Stored, largest: LargestExposure) -> str:
     """Say how many other points have the same exposure."""
     count = largest.mirrors
+    if result.symmetry_factor > 1:
+        return ", and the points that mirror it"
     return f", and {count} point{'s' if count > 1 else ''} that mirror{'s' * (count == 1)} it" * (
         count > 0
     )
@@ -421,7 +431,7 @@ def _impact(result: Stored) -> list[Row]:
 def _before_impact(result: Stored) -> list[Row]:
     """Return the row about a plate that a static load has deflected before the impact."""
     start = start_w_of(result)
-    energy = result.attributes_of("energy").get(INITIAL_PLATE, 0.0)
+    energy = result.symmetry_factor * result.attributes_of("energy").get(INITIAL_PLATE, 0.0)
     if not (start or energy):
         return []
     deflection = f"w {_quantity(result, start, 'length')} under the load"
@@ -431,7 +441,7 @@ def _before_impact(result: Stored) -> list[Row]:
 
 def _peak_force(result: Stored) -> str:
     """Format the peak force, its time and step, and its doubts."""
-    force, time = result["history/force"], result["history/time"]
+    force, time = result.whole("history/force"), result["history/time"]
     peak = int(np.argmax(force))
     text = "0: there was no contact"
     if force[peak] > 0.0:
@@ -510,7 +520,7 @@ def _rebound(result: Stored) -> str:
 def _contact_loop(result: Stored) -> str:
     """Format the work that the indentation keeps, and its share of the impact energy."""
     work = metrics_of(result)["contact_loop"]
-    if abs(work) <= np.abs(result["energy/balance_error"]).max():  # of an elastic law
+    if abs(work) <= np.abs(result.whole("energy/balance_error")).max():  # of an elastic law
         return f"{_quantity(result, 0.0, 'force*length')} kept by the indentation"
     share = f"{work / impact_energy(result):.1%} of the impact energy"
     return f"{_quantity(result, work, 'force*length')} kept by the indentation, {share}"
@@ -519,7 +529,7 @@ def _contact_loop(result: Stored) -> str:
 def _energy_balance(result: Stored) -> str:
     """Format the largest error of the energy balance, relative to the impact energy."""
     initial = impact_energy(result)
-    worst = float(np.abs(result["energy/balance_error"]).max())
+    worst = float(np.abs(result.whole("energy/balance_error")).max())
     share = f"{worst / initial:.2g} of the initial" if initial else f"{worst:.3g}, initially"
     return f"worst error {share} {_quantity(result, initial, 'force*length')}"
 

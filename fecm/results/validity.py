@@ -69,12 +69,15 @@ ERRORS = {
 }
 
 
-def in_plane_of(codes: Array, coordinates: Array | None = None) -> InPlane:
+def in_plane_of(
+    codes: Array, coordinates: Array | None = None, cut: Bools | None = None
+) -> InPlane:
     """Return the support of the edges in the plane, from the restraint codes of all nodes.
 
     The codes are (numnp, 5). Nodes at which w is restrained are the supports; a plate without
     supports is free. With the coordinates of the nodes, (numnp, 2), a plate whose supports are all
-    inside its outline lies on a window.
+    inside its outline lies on a window. `cut` are the low and high sides in x and y, (2, 2), that
+    are lines of symmetry and no outline.
     """
     held = codes != 0
     supports = held[held[:, 2]]
@@ -85,8 +88,9 @@ def in_plane_of(codes: Array, coordinates: Array | None = None) -> InPlane:
     if coordinates is not None and slides:
         places = coordinates[held[:, 2]]
         low, high = coordinates.min(axis=0), coordinates.max(axis=0)
-        inside = (places.min(axis=0) > low).all() and (places.max(axis=0) < high).all()
-        if inside and (np.ptp(places, axis=0) > 0.0).all():
+        is_cut = np.zeros((2, 2), dtype=bool) if cut is None else cut
+        inside = np.array([places.min(axis=0) > low, places.max(axis=0) < high]) | is_cut
+        if inside.all() and (np.ptp(places, axis=0) > 0.0).all():
             return InPlane.WINDOW
     if all_held:
         return InPlane.UNKNOWN

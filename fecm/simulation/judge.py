@@ -297,7 +297,7 @@ def judge_run(simulation: Simulation, result: Result) -> RunVerdict:
     notes += _springs_back(simulation, result)
     reasons = [Reason.AGAIN] if end is End.AGAIN else [Reason.OPEN] if end in OPEN_PEAKS else []
     reasons += [doubt.reason for doubt in beyond]
-    peak_force = simulation.state.monitor.peak_force
+    peak_force = result.symmetry_factor * simulation.state.monitor.peak_force
     if peak_force > CROSSED * result.threshold.get("force", np.inf):
         reasons.append(Reason.DELAMINATED)
     return RunVerdict(notes, joined(reasons))

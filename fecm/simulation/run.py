@@ -20,7 +20,14 @@ from fecm.problem.build import RunOptions
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem, Threshold
 from fecm.results.exposures import AT_REST, count_evaluations
-from fecm.results.metrics import INITIAL_PLATE, MOBILITY, REST_W, START_W, VALIDITY
+from fecm.results.metrics import (
+    FACTOR,
+    INITIAL_PLATE,
+    MOBILITY,
+    REST_W,
+    START_W,
+    VALIDITY,
+)
 from fecm.results.result import Result
 from fecm.results.schema import KINEMATICS, Form, Kinematics, heading
 from fecm.results.sinks import ReadOnce, Sink
@@ -86,6 +93,7 @@ def _write_header(simulation: Simulation) -> None:
         **options.rod_method.attributes,
         **_own_parts(options),
         **_units(deck),
+        **_symmetry(simulation.problem),
     }
     sink.attributes("", attributes)
     sink.deck(deck.text or deck.to_text())
@@ -136,6 +144,12 @@ def _units(deck: Deck) -> dict[str, str]:
     return {f"unit_{name}": unit for name, unit in unit_names(deck).items()}
 
 
+def _symmetry(problem: Problem) -> dict[str, int]:
+    """Return the attribute of a symmetric part; empty for a whole plate."""
+    factor = problem.symmetry.factor
+    return {FACTOR: factor} if factor > 1 else {}
+
+
 def _write_footer(simulation: Simulation) -> Result:
     """Store what is decided at the end of the run, and reasons to doubt the result."""
     sink = simulation.sink
@@ -179,7 +193,7 @@ def _undoubted(simulation: Simulation, datasets: ReadOnce, history: dict[str, An
     """Return the result before it is judged, with what its metrics need."""
     problem, steps = simulation.problem, simulation.recorder.steps
     groups: dict[str, dict[str, Any]] = {
-        "": _units(problem.deck),
+        "": {**_units(problem.deck), **_symmetry(problem)},
         "failure": {"modes": list(MODES)},
         "history": history,
         "energy": {"initial": steps.initial, INITIAL_PLATE: steps.initial_plate},

@@ -66,7 +66,9 @@ class Simulation:
         self.interval = pace.interval(self.model.plate.neq)
         limit = options.energy_limit if self.model.variant.is_report else None
         # Without a reference to the run, which would keep it alive.
-        on_block = partial(state.monitor.add, limit=limit, threshold=problem.threshold)
+        threshold = problem.threshold
+        force = None if threshold is None else threshold.force / problem.symmetry.factor
+        on_block = partial(state.monitor.add, limit=limit, threshold=force)
         self.recorder = Recorder(self.sink, self.model, problem.work, on_block)
 
     @cached_property

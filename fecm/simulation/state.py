@@ -17,7 +17,7 @@ from fecm.mechanics.plate_motion import DivergenceError, PlateState
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import ImpactModel
 from fecm.problem.contact_estimates import contact_step
-from fecm.problem.problem import Problem, Threshold
+from fecm.problem.problem import Problem
 from fecm.simulation.recorder import Columns
 
 if TYPE_CHECKING:
@@ -36,7 +36,8 @@ def cause_of_divergence(
         critical = critical_time_step(plate)
         contact = None
         if law is None:
-            contact = contact_step(problem.deck, plate, problem.contact, dt, critical)
+            factor = problem.symmetry.factor
+            contact = contact_step(problem.deck, plate, problem.contact, dt, critical, factor)
     except UnsoundPlateError as error:
         return str(error)
     side = "above" if dt > critical else "below"
@@ -75,9 +76,11 @@ class Monitor:
     crossing: float = math.nan  # when it first reached the delamination threshold
 
     def add(
-        self, block: Columns, initial: float, limit: float | None, threshold: Threshold | None
+        self, block: Columns, initial: float, limit: float | None, threshold: float | None
     ) -> None:
         """Add a block of steps; `initial` is the energy before the first step.
+
+        `threshold` is the delamination threshold as a force on the plate of the deck.
 
         The error is relative to the energy supplied up to the end of the block, as a load has done
         almost no work in its first steps. The work of one step is not counted as an error: the work
@@ -106,10 +109,10 @@ class Monitor:
             reason = f"{off}, more than the limit of {limit:.3g}"
             raise DivergenceError(int(block["step"][row]), reason)
 
-    def _add_force(self, block: Columns, threshold: Threshold) -> None:
+    def _add_force(self, block: Columns, threshold: float) -> None:
         """Add the contact forces of a block."""
         self.peak_force = max(self.peak_force, float(block["force"].max()))
-        above = np.flatnonzero(block["force"] >= threshold.force)
+        above = np.flatnonzero(block["force"] >= threshold)
         if len(above) and math.isnan(self.crossing):
             self.crossing = float(block["time"][above[0]])
 

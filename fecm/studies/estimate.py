@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from fecm.deck.model import Impact, Indentation
+from fecm.deck.model import Impact
 from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity
 from fecm.mechanics.quick_models import (
     QuickImpact,
@@ -21,9 +21,7 @@ from fecm.mechanics.quick_models import (
     stored_at,
 )
 from fecm.mechanics.roots import root
-from fecm.mechanics.solutions import static_stiffness
-from fecm.problem.estimates import NoCurveError, nonlinear_curve
-from fecm.problem.parts import build_projectile
+from fecm.problem.estimates import NoCurveError, nonlinear_curve, whole_stiffness
 from fecm.problem.problem import Problem
 from fecm.results.validity import LIMITS
 from fecm.studies import StudyError
@@ -77,11 +75,11 @@ def quick_estimate(problem: Problem) -> QuickEstimate:
     if contact is None:
         raise StudyError("the deck has no impact: RODP in the program, with ROD and EXPE")
     deck, laminate = problem.deck, problem.laminate
-    mass, velocity = build_projectile(deck).total_mass, deck.require(Impact).velocity
+    mass, velocity = problem.projectile_mass, deck.require(Impact).velocity
     if not velocity > 0.0:
         raise StudyError(f"the velocity of ROD is {velocity:g}: the projectile does not approach")
-    k = deck.require(Indentation).k
-    ratio = mass / problem.plate.total_mass()
+    k = problem.contact_coefficient
+    ratio = mass / problem.plate_mass
     force = math.nan if problem.threshold is None else problem.threshold.force
     parameter = _inelasticity(problem, mass, velocity)
 
@@ -92,7 +90,7 @@ def quick_estimate(problem: Problem) -> QuickEstimate:
     models = [
         QuickModel("infinite plate", small, SMALL_MASS * force, reached, applies=ratio < SMALL)
     ]
-    stiffness = static_stiffness(problem.moving_plate, contact)
+    stiffness = whole_stiffness(problem)
     if not math.isfinite(stiffness):
         return QuickEstimate(mass, ratio, parameter, stiffness, tuple(models))
     large = static_plate(mass, velocity, k, stiffness)
@@ -119,16 +117,16 @@ def velocity_at(problem: Problem, force: float) -> float:
     Between the ranges of the two models, both underestimate the force. Where no model applies, as
     for a free plate under a large mass, the velocity of the deck is returned.
     """
-    deck, contact = problem.deck, problem.contact
+    contact = problem.contact
     assert contact is not None  # the program has impact steps
-    mass, velocity = build_projectile(deck).total_mass, deck.require(Impact).velocity
-    k = deck.require(Indentation).k
-    if mass < problem.plate.total_mass():
+    mass, velocity = problem.projectile_mass, problem.deck.require(Impact).velocity
+    k = problem.contact_coefficient
+    if mass < problem.plate_mass:
         return _velocity_at_peak(_peaks_on_infinite_plate(problem, mass), velocity, force)
     try:
         return _static_velocity(nonlinear_curve(problem, 0.0, force), mass, k, force)
     except NoCurveError:
-        stiffness = static_stiffness(problem.moving_plate, contact)
+        stiffness = whole_stiffness(problem)
     if math.isnan(stiffness):
         return velocity
     return _velocity_at_peak(lambda v: static_peak(mass, v, k, stiffness), velocity, force)
@@ -154,13 +152,13 @@ def _static_velocity(curve: StaticCurve, mass: float, k: float, force: float) ->
 
 def _inelasticity(problem: Problem, mass: float, velocity: float) -> float:
     """Return Zener's parameter of an impact on the plate of a problem."""
-    laminate, k = problem.laminate, problem.deck.require(Indentation).k
+    laminate, k = problem.laminate, problem.contact_coefficient
     return inelasticity(mass, velocity, k, laminate.mass, effective_rigidity(laminate))
 
 
 def _peaks_on_infinite_plate(problem: Problem, mass: float) -> Callable[[float], float]:
     """Return the peak force on the infinite plate as a function of the velocity."""
-    k = problem.deck.require(Indentation).k
+    k = problem.contact_coefficient
     return lambda v: peak_on_infinite_plate(mass, v, k, _inelasticity(problem, mass, v))
 
 

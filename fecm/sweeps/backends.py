@@ -39,6 +39,7 @@ from fecm.sweeps.in_full import (
     problem_of_case,
     run_case_in_full,
     thresholds_of,
+    whole_force,
     with_hit,
 )
 from fecm.sweeps.outcome import About, Backend, Outcome, Status, merge, outcome_of
@@ -184,7 +185,8 @@ def _in_full(settings: Settings, number: int, case: Case) -> Outcome:
             level, at_rest = float(sought.level), problem.worst_at_rest
             if at_rest is not None and at_rest.exposure >= level:
                 raise CasesError(f"the plate at rest has the exposure {at_rest.exposure:.4g}")
-            impacts = impacts_from_cards({number: strike_of(problem.deck)}, settings.law)
+            strikes = {number: strike_of(problem.deck)}
+            impacts = impacts_from_cards(strikes, settings.law, problem.symmetry.factor)
             backend = FullRuns(problem, settings.measures)
             outcome = search(backend, impacts, sought.quantity, np.array([level]))
     except CasesError as error:
@@ -402,6 +404,7 @@ def _outcome_together(
             struck.plate,
             thresholds_of(checked, ordered.toughness),
             checked.judge.mobility,
+            checked.symmetry.factor,
         )
         strains = plate.strains if judged else {}
         peaks = {name: CasePeaks(*largest_sums(r, struck.force)) for name, r in strains.items()}
@@ -412,7 +415,7 @@ def _outcome_together(
         steps=steps,
         dt=dt,
         unsettled=struck.unconverged_steps,
-        force=struck.force.T if history else None,
+        force=whole_force(struck.force.T, checked.symmetry.factor) if history else None,
     )
     largest = struck.indentation.largest
     judge_cases(outcome, checked, measures, metrics, peaks=peaks, indentation=largest)

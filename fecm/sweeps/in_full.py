@@ -30,6 +30,7 @@ from fecm.results.metrics import (
     BAND,
     EVALUATIONS,
     EXPOSURES,
+    FACTOR,
     GAGE,
     HIT,
     RATIO,
@@ -104,7 +105,14 @@ def judge_cases(
     if Measure.DEFLECTION in measures:
         decided_values[Measure.DEFLECTION] = metrics.deflection
     decided_values[RATIO] = np.where(np.isnan(deflection), np.nan, ratio)
+    if checked.symmetry.lines:
+        decided_values[FACTOR] = np.full(len(end), float(checked.symmetry.factor))
     outcome.columns |= {**decided_values, About.VALIDITY: rules.validity(extent)}
+
+
+def whole_force(force: Floats, factor: int) -> Floats:
+    """Return contact forces on the whole plate, from those on one of its symmetric parts."""
+    return force if factor == 1 else factor * force
 
 
 def peaks_of(measures: Sequence[Measure], result: Result) -> dict[str, CasePeaks]:
@@ -273,7 +281,7 @@ def _outcome(
         permanent=permanent,
         work=result["energy/contact_work"][-1:],
     )
-    strike = strike_of(checked.deck)
+    strike, factor = strike_of(checked.deck), checked.symmetry.factor
     metrics = impact_metrics(
         force[:, None],
         times,
@@ -282,6 +290,7 @@ def _outcome(
         deflection_of(result),
         None if checked.threshold is None else checked.threshold.force,
         checked.judge.mobility,
+        factor,
     )
     outcome = outcome_of(
         [number],
@@ -290,7 +299,7 @@ def _outcome(
         steps=len(force),
         dt=dt,
         unsettled=np.array([about.get("unsettled_steps", 0)]),
-        force=force[None],
+        force=whole_force(force, factor)[None],
     )
     peaks = peaks_of(measures, result)
     judge_cases(

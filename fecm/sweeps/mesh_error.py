@@ -161,8 +161,8 @@ def compare_peaks(
     """
     coarse, refined = (_run(item, options, advance) for item in (problem, fine))
     return MeshErrorEstimate(
-        peak_force=float(coarse["history/force"].max()),
-        refined_peak_force=float(refined["history/force"].max()),
+        peak_force=float(coarse.whole("history/force").max()),
+        refined_peak_force=float(refined.whole("history/force").max()),
         elements=problem.deck.control.numel,
         refined_elements=fine.deck.control.numel,
         distance=_distance(problem),

@@ -16,8 +16,10 @@ from fecm.authoring.case import THRESHOLD, pair_of_text
 from fecm.deck.model import Curvature, Preload, Segment
 from fecm.deck.units import column_name, quantity
 from fecm.problem.generate import generate
+from fecm.problem.symmetry import symmetry_of
 from fecm.results.exposures import RESOLVED
-from fecm.results.metrics import FOUND_BAND, RATIO
+from fecm.results.metrics import FACTOR, FOUND_BAND, RATIO
+from fecm.results.stored import whole_plate
 from fecm.results.validity import (
     BENT,
     MEANING,
@@ -54,6 +56,8 @@ def sweep_rows(result: StoredSweep) -> list[Row]:
         rows.append(("contact law", f"{result.law}, instead of EXPE"))
     if result.measured:
         rows.append(("measured", f"{', '.join(result.measured)}, which are not varied"))
+    if text := symmetry_text(result):
+        rows.append(("symmetry", text))
     rows += [*_extremes(result), *_moved(result)]
     for reason, times in failed.most_common(MOST_REASONS):
         rows.append(("failed", f"{times}: {reason}"))
@@ -62,6 +66,18 @@ def sweep_rows(result: StoredSweep) -> list[Row]:
     if result.random is not None and failed:
         rows.append(("failed share", f"{(~fine).mean():.3%} of the draws"))
     return [*rows, *(() if result.reduced is None else result.reduced.rows())]
+
+
+def symmetry_text(result: StoredSweep) -> str:
+    """Say which cases are of a half or a quarter of a plate; empty if none is."""
+    if FACTOR not in result.summary:
+        return ""
+    factors = result[FACTOR][result.completed].astype(int)
+    texts = {factor: whole_plate(factor) for factor in sorted(set(factors.tolist())) if factor > 1}
+    if len(set(factors.tolist())) == 1:
+        return next(iter(texts.values()), "")
+    counts = {factor: np.count_nonzero(factors == factor) for factor in texts}
+    return "; ".join(f"{counts[factor]} of {len(result)}: {text}" for factor, text in texts.items())
 
 
 def _extremes(result: StoredSweep) -> Iterator[Row]:
@@ -203,7 +219,7 @@ def _in_plane(result: StoredSweep) -> InPlane:
         mesh = generate(result.deck)
     except (ResultFileError, ValueError, LookupError):  # of a damaged file
         return InPlane.UNKNOWN
-    in_plane = in_plane_of(mesh.codes, mesh.coordinates)
+    in_plane = in_plane_of(mesh.codes, mesh.coordinates, symmetry_of(result.deck, mesh).cut)
     return in_plane if in_plane is InPlane.WINDOW else InPlane.UNKNOWN
 
 

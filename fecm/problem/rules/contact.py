@@ -117,12 +117,12 @@ def exchanged_constants(problem: Problem) -> Reports:
         yield Report(message, law.place(law.names()[1]), hint)
 
 
-def sphere_radius(deck: model.Deck) -> float:
-    """Return the radius of a rigid sphere with the k of a deck, length.
+def sphere_radius(problem: Problem) -> float:
+    """Return the radius of a rigid sphere with the k of a problem, length.
 
     The radius follows from equation 3-2 with E2 for E_t.
     """
-    k, e2 = deck.require(model.Indentation).k, deck.require(model.Material).ply.e2
+    k, e2 = problem.contact_coefficient, problem.deck.require(model.Material).ply.e2
     with np.errstate(all="ignore"):
         return float((0.75 * np.float64(k) / e2) ** 2)
 
@@ -141,7 +141,7 @@ def doubtful_coefficient(problem: Problem) -> Reports:
         return
     if deck.has(model.Materials):  # a face on a soft core is softer than its plies
         return
-    law, radius = deck.require(model.Indentation), sphere_radius(deck)
+    law, radius = deck.require(model.Indentation), sphere_radius(problem)
     size, real = in_si(COEFFICIENT, names), REAL["contact coefficient"]
     if size is not None and not real.least <= law.k * size <= real.greatest:  # W435 too
         return

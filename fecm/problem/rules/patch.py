@@ -220,7 +220,7 @@ def _large_patch(problem: Problem, limit: float) -> str:
     law = problem.deck.require(model.Indentation)
     with np.errstate(all="ignore"):
         indentation = (expected_peak(problem.deck, problem.plate) / law.k) ** (2.0 / 3.0)
-        contact = math.sqrt(sphere_radius(problem.deck) * indentation)
+        contact = math.sqrt(sphere_radius(problem) * indentation)
     if not card.radius > LARGE * contact > 0.0:
         return ""
     return (

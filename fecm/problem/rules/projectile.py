@@ -223,8 +223,7 @@ def large_energy(problem: Problem) -> Reports:
     if force is None:
         return
     impact = problem.deck.require(model.Impact)
-    mass = build_projectile(problem.deck).total_mass
-    energy = 0.5 * mass * impact.velocity**2
+    energy = 0.5 * problem.projectile_mass * impact.velocity**2
     share = energy / problem.laminate.thickness * force  # J/m, which is N
     if share > MOST_ENERGY:
         joule = energy * (in_si("force*length", names) or 1.0)
