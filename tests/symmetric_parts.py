@@ -21,14 +21,14 @@ def whole_deck(support: Any = "simple", **options: Any) -> fecm.Deck:
     chosen: dict[str, Any] = {
         "plate": fecm.Plate.rectangle((100.0, 80.0), (6, 6), support=support),
         "laminate": fecm.Laminate("[0/90]2s", "IM7/8552", THICKNESS / 8),
-        "projectile": fecm.RigidMass(4e-4),
+        "projectile": fecm.RigidMass(2e-5),
         "contact": LAW,
-        "velocity": 2500.0,
+        "velocity": 8000.0,
         "units": "mm-N-s",
         "patch": None,
         "damage": True,
         "plies": False,
-        "duration": 4e-4,
+        "duration": 8e-4,
         "kinematics": "linear",
     }
     return fecm.impact(**chosen | options)

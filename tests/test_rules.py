@@ -17,6 +17,7 @@ from tests import decks
 from tests.builders import square
 from tests.decks import DATA, DATA_CARDS, MESH, PLY_PROGRAM, PROGRAM, ROOT, small
 from tests.sound_plate import base, replaced, strengths, with_card
+from tests.symmetric_parts import part_of, whole_deck
 from tests.test_element_decks import deck as element_deck
 from tests.test_input_mistakes import MISTAKES
 
@@ -339,6 +340,15 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "E459": more("DAMP\n-1.,\n"),
     "W460": more("DAMP\n1.E6,\n"),
     "W556": on_window,
+    "W565": lambda: part_of(whole_deck(), (0,)).with_(at=(75.0, 40.0)).to_text(),
+    "W566": lambda: part_of(
+        whole_deck(laminate=fecm.Laminate("[45/-45]s", "IM7/8552", 0.25)), (0,)
+    ).to_text(),
+    "W567": lambda: supports(
+        "    1    1   -1   -1    0    0    0",
+        "   25    0    1    1    0    0    0",
+        "   11    0    1    1    0    1    0",
+    )().replace("ROD\n   13", "ROD\n   11"),
     "N559": plate(replaced("171420.0    9080.0", " 65000.0   63000.0")),
     "N560": plate(strengths(2326.2, 1200.1, 62.3, 199.8, 20.0, 92.3, 92.3)),
     "W557": with_hole,

@@ -287,7 +287,8 @@ def test_the_supported_plates_figures_are_the_steps_of_its_modes() -> None:
         before, now = now, turn * now - before + push * forces[-1]
         x_before, x = x, 2.0 * x - x_before - forces[-1] / m * dt**2
     figures = {
-        "largest force": max(forces), "its time": dt * int(np.argmax(forces)),
+        "largest force": max(forces), "its impulse": dt * sum(forces),
+        "its time": dt * int(np.argmax(forces)),
         "largest w": max(deflections), "velocity": (x_before - x) / dt,
     }  # fmt: skip
     for quantity, figure in figures.items():

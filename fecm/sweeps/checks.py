@@ -26,6 +26,7 @@ from fecm.mechanics.mesh import element_centres
 from fecm.problem.check import check_segments, check_values
 from fecm.problem.memory import needed_bytes, reduction_bytes
 from fecm.problem.problem import Problem
+from fecm.problem.symmetry import SAME_LINE
 from fecm.sweeps.in_full import stores_rows, without_output
 from fecm.sweeps.plan import FORCES, MOST_TOGETHER, Plan, runs_together, tasks
 
@@ -44,7 +45,7 @@ def doubtful_values(checked: Problem, cases: Sequence[Case]) -> list[str]:
     The rules are the rules for a deck's values. They are limits. It is enough to check the smallest
     and the largest value of each name, one name at a time.
     """
-    notes = list(_notes_of_places(checked, cases))
+    notes = [*_notes_of_places(checked, cases), *_notes_of_symmetry(checked, cases)]
     known_findings = {(finding.code, finding.message) for finding in _findings(checked)}
     for name in cases[0]:
         if name not in JUDGED:
@@ -96,6 +97,22 @@ def _notes_of_places(checked: Problem, cases: Sequence[Case]) -> Iterator[str]:
             f"{which} the free rim outside the supports, the first at ({x:g}, {y:g}): a fixture is "
             "solid there [W556]"
         )
+
+
+def _notes_of_symmetry(checked: Problem, cases: Sequence[Case]) -> Iterator[str]:
+    """Name the impact points beside the lines of symmetry of the deck's part of a plate."""
+    if not cases[0].keys().isdisjoint(OTHER_PLATE):
+        return
+    places = [place for case in cases if (place := _place_of(checked, case)) is not None]
+    near = SAME_LINE * checked.longer_side
+    for line in checked.symmetry.lines:
+        beside = [place for place in places if abs(place[line.axis] - line.place) > near]
+        if beside:
+            (x, y), count = beside[0], len(beside)
+            yield (
+                f"{count} case{'s' * (count > 1)} beside the line of symmetry {line}, the first at "
+                f"({x:g}, {y:g}): mirror images hit the plate at the same time [W565]"
+            )
 
 
 def _place_of(checked: Problem, case: Case) -> tuple[float, float] | None:

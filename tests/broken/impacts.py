@@ -18,7 +18,7 @@ from fecm.mechanics import (
 from fecm.mechanics import impact as impacts
 from fecm.mechanics import laminate as laminates
 from fecm.problem import parts
-from fecm.results import end
+from fecm.results import end, metrics
 from tests.breaks import (
     Breaks,
     changed,
@@ -44,6 +44,10 @@ BREAKS: Breaks = {
             "rigid-target": ("deepest", "largest", "contact", "ACR"), "supported-plate": ("",),
             "curved-impact": ("peak", "time"), "small-mass": ("largest force of",),
         },
+    ),
+    "a quarter taken as the whole plate": (
+        value(metrics, "SHARED", ()),
+        {"supported-plate": ("largest force", "its impulse")},
     ),
     "a peak passes at 0.8 of the force": (
         value(end, "FALLEN", 0.8),

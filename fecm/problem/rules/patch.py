@@ -247,7 +247,7 @@ def large_patch(problem: Problem) -> Reports:
 
     Remedy: The radius of the contact, or blank for 0.327 h.
     """
-    limit = min(LARGE * problem.laminate.thickness, INDENTER * sphere_radius(problem.deck))
+    limit = min(LARGE * problem.laminate.thickness, INDENTER * sphere_radius(problem))
     if _judges_stresses(problem) and (what := _large_patch(problem, limit)):
         card = problem.deck.require(model.Patch)
         message = (
