@@ -421,6 +421,7 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "W516": program(".5E-6", "5E-11"),
     "W517": stiff_contact,
     "W518": macros(PROGRAM + "EXCD\n"),
+    "W563": macros(STATIC.replace("CONV\n", "") + PROGRAM.replace("NEXT", "FORM\nSOLV\nNEXT")),
     "E519": macros("LMAS\nDT        .5E-6\nLOOP          3\nTIME\nDISP\nNEXT\n"),
     "W520": lambda: small(
         PROGRAM.replace("RODP          5", "EXCD"), data="FORC\n13,0,0.,0.,1.\n\n" + DATA_CARDS

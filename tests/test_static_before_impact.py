@@ -215,3 +215,19 @@ def test_a_projectile_starts_on_a_plate_that_steps_without_it_have_moved() -> No
     assert not moved.force[:100].any()
     approach = 115.0 * 0.5e-6 - (moved.plate_w[100] - start)
     assert moved.indentation[100] == pytest.approx(approach, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("program", "doubted"),
+    [
+        (STATIC + STEPS, False),
+        (STEPS + STATIC, False),
+        (PASSES + STEPS + PASSES, False),
+        (STEPS + STATIC + "RODP         20\n", True),
+        ("TANG\n" + STEPS.replace("TIME", "FORM\nSOLV\nTIME"), True),
+        ("TANG\n" + STEPS.replace("NEXT", "FORM\nSOLV\nNEXT").replace("120", "  1"), False),
+    ],
+)
+def test_a_static_solution_between_impact_steps_is_doubted(program: str, doubted: bool) -> None:
+    codes = [finding.code for finding in fecm.check(deck(PLIES + PUSH, program)).findings]
+    assert ("W563" in codes) == doubted

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fecm.deck import model
-from fecm.deck.macros import MOST_MACROS, every, flat
+from fecm.deck.macros import MOST_MACROS, Body, Loop, every, flat
 from fecm.deck.model import Macro
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics.ply_stresses import is_complete
@@ -214,6 +214,42 @@ def projectile_stands_still(problem: Problem) -> Reports:
         yield Report(message, last.place("macro"), "RODP applies the loads of FORC too")
 
 
+# State after a word, by the state before it: 0 before impact steps, 1 after an impact step, 2 after
+# a static solution that follows a step, 3 if a step follows that solution.
+States = tuple[int, ...]
+STATES: dict[str, States] = {"RODP": (1, 1, 3, 3), "SOLV": (0, 2, 2, 3)}
+SAME: States = (0, 1, 2, 3)
+
+
+def _states_after(body: Body) -> States:
+    """Return the states after a body of the program, by the states before it."""
+    states = SAME
+    for item in body:
+        change, passes = SAME, 1
+        if isinstance(item, Loop):  # the states no longer change after three passes
+            change, passes = _states_after(item.body), min(item.count, 3)
+        elif item.word in STATES:
+            change = STATES[item.word]
+        for _ in range(passes):
+            states = tuple(change[state] for state in states)
+    return states
+
+
+@rule("W563", Subject.PROGRAM)
+def static_solution_in_impact(problem: Problem) -> Reports:
+    """A static solution (SOLV) stands between impact steps.
+
+    It moves the plate at once to its equilibrium without the contact force, away from the
+    projectile or into it.
+
+    Remedy: SOLV before the first RODP or after the last.
+    """
+    if _states_after(problem.program)[0] == 3:
+        last = [macro for macro in problem.deck.macros if macro.word == "SOLV"][-1]
+        message = "SOLV between impact steps moves the plate at once, but not the projectile."
+        yield Report(message, last.place("macro"), "solve before the first RODP, or after the last")
+
+
 OF_LENGTH = (endless_program,)
 OF_OUTPUT = (
     nothing_stored,
@@ -223,4 +259,9 @@ OF_OUTPUT = (
     wrong_number_of_elements,
     large_result,
 )
-OF_PURPOSE = (plate_at_rest, nothing_hits, projectile_stands_still)
+OF_PURPOSE = (
+    plate_at_rest,
+    nothing_hits,
+    projectile_stands_still,
+    static_solution_in_impact,
+)
