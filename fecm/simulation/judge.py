@@ -402,8 +402,8 @@ def _springs_back(simulation: Simulation, result: Result) -> Iterator[str]:
         w = quantity(start, unit_of("length", result.units))
         yield (
             f"the impact starts at w = {w} under the load, but the nodal forces do not hold the "
-            "plate there during the impact: it moves without the projectile too; the load factor "
-            "of the static solution would hold it"
+            "plate there during the impact: it moves without the projectile too; a static solution "
+            "at the load factor of the impact, to the default tolerance, would be held"
         )
 
 
