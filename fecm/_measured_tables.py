@@ -171,7 +171,7 @@ class MeasuredTable(NamedTuple):
         if columns is None:
             remedy = "rename it in the file"
         for order, (name, column) in enumerate(zip(names, names_given, strict=True)):
-            if column.isdecimal() and int(column) and column not in self.names:
+            if is_column_number(column) and column not in self.names:
                 place = int(column) - 1
             elif not self.head[1] and not column:
                 place = order
@@ -186,7 +186,7 @@ class MeasuredTable(NamedTuple):
 
     def _check_numbers(self, requested: Sequence[str]) -> None:
         """Raise StudyError if columns are given by numbers that are names of other columns."""
-        numbered = all(column.isdecimal() for column in requested)
+        numbered = all(map(is_column_number, requested))
         names = [n for n in requested if numbered and self.names[int(n) - 1 : int(n)] != [n]]
         if names and (both := [n for n in names if n in self.names]):
             verb = "is a name" if len(both) == 1 else "are names"
@@ -308,7 +308,8 @@ class MeasuredTable(NamedTuple):
         ]
         if len(fields) < len(columns) or any(_number(field) is None for field in fields):
             return False
-        if len(set(fields)) < len(fields) or not all(f.isdecimal() and int(f) for f in fields):
+        whole = [field for field in fields if field.isdecimal() and field.strip("0")]
+        if len(set(fields)) < len(fields) or len(whole) < len(fields):
             return True
         warn(f"{self.path}:{self.head[0]}: {', '.join(fields)} are taken as names, not as a row")
         return False
@@ -517,6 +518,11 @@ def unit_in(name: str) -> str:
     'kN'
     """
     return column_head(name).unit
+
+
+def is_column_number(text: str) -> bool:
+    """Return whether a text is the number of a column, from 1."""
+    return text.isdecimal() and len(text) < 10 and int(text) > 0
 
 
 def same_name(name: str, other_name: str) -> bool:

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
 
+import numpy as np
 import pytest
 
-from fecm import _inputs
+import fecm
+from fecm import FecmError, _inputs
 from fecm._inputs import InputError, parsed_toml, read_input
+from fecm.authoring import in_units, parse_vary
+from fecm.mechanics import coincident, representatives, sides_of_cells
+from fecm.problem import read_mesh
+from fecm.studies import recorded
 from tests.calls import call
 from tests.decks import LONG
 
@@ -126,3 +132,46 @@ def test_deeply_nested_toml_is_refused_at_once(
 def test_toml_as_people_write_it_is_read() -> None:
     key = ".".join("a" * 100)
     assert parsed_toml(f'source = "Tab. 3.1, p. 12, cf. ref. 4."\n{key} = 1.5')["source"]
+
+
+LONG_RUNS: dict[
+    str, tuple[str, str, Callable[[Path], object]]
+] = {  # a reader of quadratic time takes minutes
+    "blank lines": ("a.msh", "\n" * 100_000, read_mesh),
+    "digits": ("a.bdf", "GRID,1,," + "1" * 3_000 + "x,0.,0.", read_mesh),
+    "blanks in a name": ("a.bdf", "INCLUDE a" + " " * 100_000 + "b", read_mesh),
+    "commas": ("a.inp", "*Node\n1" + "," * 100_000 + "x\n*Element, type=S4\n1, 1", read_mesh),
+    "words": ("a.inp", "*Nset, nset=a" + ", generate" * 20_000, read_mesh),
+    "brackets": ("a.csv", "time," + "(" * 100_000 + "\n0,0\n1,x\n", recorded),
+    "nested list": ("a.toml", "[" * 500_000, fecm.materials),
+}
+
+
+@pytest.mark.parametrize("name", LONG_RUNS)
+def test_a_file_of_one_repeated_character_is_refused_at_once(name: str, tmp_path: Path) -> None:
+    file, text, read = LONG_RUNS[name]
+    (tmp_path / file).write_text(text)
+    with pytest.raises((FecmError, ValueError), match=file):
+        read(tmp_path / file)
+
+
+@pytest.mark.parametrize(
+    "read",
+    [
+        lambda: parse_vary("velocity=" + "," * 100_000 + "x"),
+        lambda: parse_vary("velocity=1:2:" + "9" * 5000),
+        lambda: in_units("length", "1" * 100_000 + "!", "length", "mm-N-s"),
+    ],
+    ids=["commas", "digits of a count", "digits of a value"],
+)
+def test_a_long_value_is_refused_at_once(read: Callable[[], object]) -> None:
+    with pytest.raises(FecmError):
+        read()
+
+
+def test_many_nodes_in_one_place_take_no_pair_for_each_two_of_them() -> None:
+    corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+    places = np.concatenate([corners, np.tile(corners[2], (30_000, 1)), [(1.0, 1.0 + 1e-6)]])
+    pairs = coincident(places, sides_of_cells(np.array([[0, 1, 2, 3]]), 4))
+    assert len(pairs) == 30_001
+    assert representatives(len(places), pairs).tolist() == [0, 1, 2, 3] + [2] * 30_001

@@ -245,8 +245,38 @@ def test_include_is_followed_from_the_file_that_has_it(tmp_path: Path) -> None:
     (tmp_path / "parts" / "rest.bdf").unlink()
     with pytest.raises(fecm.MeshError, match=r"all\.bdf:1: INCLUDE: .*put it beside"):
         read(tmp_path, text)
+    for number in range(11):
+        (tmp_path / f"{number}.bdf").write_text(f"INCLUDE {number + 1}.bdf\n")
     with pytest.raises(fecm.MeshError, match="nested deeper"):
-        read(tmp_path, bulk("INCLUDE plate.bdf"))
+        read(tmp_path, bulk("INCLUDE 0.bdf"))
+
+
+def test_a_file_is_included_once_and_from_the_folder_of_the_mesh(tmp_path: Path) -> None:
+    folder = tmp_path / "here"
+    folder.mkdir()
+    for number in range(8):  # 12^8 files, if each were read as often as it is included
+        (folder / f"b{number}.bdf").write_text(f"INCLUDE 'b{number + 1}.bdf'\n" * 12)
+    (folder / "b8.bdf").write_text("$\n")
+    with pytest.raises(fecm.MeshError, match=r"b7\.bdf:2: INCLUDE: .*b8\.bdf is included before"):
+        read(folder, bulk("INCLUDE b0.bdf"))
+    with pytest.raises(fecm.MeshError, match=r"plate\.bdf is included before"):
+        read(folder, bulk("INCLUDE plate.bdf"))
+    (tmp_path / "secret").write_text("+SECRET\n")
+    for name in ("../secret", str(tmp_path / "secret")):
+        with pytest.raises(fecm.MeshError, match=r"secret is outside .*put it beside") as refused:
+            read(folder, bulk(f"INCLUDE '{name}'"))
+        assert "SECRET" not in str(refused.value)
+    with pytest.raises(fecm.MeshError, match="is not the name of a file"):
+        read(folder, bulk("INCLUDE 'a\0b'"))
+
+
+@pytest.mark.links
+def test_a_link_to_another_folder_is_not_included(tmp_path: Path) -> None:
+    (tmp_path / "here").mkdir()
+    (tmp_path / "secret").write_text("+SECRET\n")
+    (tmp_path / "here" / "a.bdf").symlink_to(tmp_path / "secret")
+    with pytest.raises(fecm.MeshError, match=r"a\.bdf is outside "):
+        read(tmp_path / "here", bulk("INCLUDE a.bdf"))
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from fecm.authoring.cases import read_cases as read_cases
 from fecm.authoring.impacts import impacts_from_cards as impacts_from_cards
 from fecm.authoring.mesh import InPlane as InPlane
 from fecm.authoring.parameters import ObjectError as ObjectError
+from fecm.authoring.parameters import in_units as in_units
 from fecm.authoring.plate import Support as Support
 from fecm.authoring.strike import Strike as Strike
 from fecm.authoring.strike import strike_of as strike_of

@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol, runtime_checkable
@@ -317,15 +318,13 @@ def parse_vary(text: str, system: str | None = None) -> tuple[str, list[Value]]:
     check_known(name, text)
     if not equals or not text_of_values:
         raise CasesError(f"`{text}`: write {name}=FROM:TO:N or {name}=A,B,C")
-    if (
-        kind_of(name) is ValueKind.TEXT or ":" not in text_of_values
-    ):  # split at commas outside brackets
-        parts = re.split(r",(?![^\[]*\]|[^(]*\))", text_of_values)
+    if kind_of(name) is ValueKind.TEXT or ":" not in text_of_values:
+        parts = _split_outside_brackets(text_of_values)
         if name == "at" and not re.search("[(; ]", text_of_values):
             parts = _points(parts)
         return name, [parse_value(name, part, system) for part in parts if part.strip()]
     parts = text_of_values.split(":")
-    if len(parts) != 3 or not re.fullmatch(r"\d+", parts[2].strip()) or not int(parts[2]):
+    if len(parts) != 3 or not re.fullmatch(r"\d{1,9}", parts[2].strip()) or not int(parts[2]):
         raise CasesError(f"`{text}`: a range is FROM:TO:N with N of at least 1")
     start, stop = (number_of_text(name, without_unit(name, part, system)) for part in parts[:2])
     count = int(parts[2])
@@ -336,6 +335,16 @@ def parse_vary(text: str, system: str | None = None) -> tuple[str, list[Value]]:
     if not all(map(math.isfinite, values)):
         raise CasesError(f"`{text}`: the range is beyond the range of numbers")
     return name, [parse_value(name, repr(v)) for v in values]
+
+
+def _split_outside_brackets(text: str) -> list[str]:
+    """Split a text at the commas outside brackets."""
+    depth, commas = 0, []
+    for place, char in enumerate(text):
+        depth += (char in "[(") - (char in "])")
+        if char == "," and depth <= 0:
+            commas.append(place)
+    return [text[before + 1 : after] for before, after in pairwise([-1, *commas, len(text)])]
 
 
 def _points(numbers: Sequence[str]) -> list[str]:

@@ -12,7 +12,7 @@ from typing import TypeGuard
 from fecm._errors import FecmError
 from fecm.deck.units import MASS, MODULUS, in_si, unit_in_si, units_of
 
-NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 
 # Examples of values with a unit, by dimension, for messages.
 EXAMPLES = {

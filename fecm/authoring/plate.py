@@ -68,7 +68,7 @@ def parse_fixture(text: str) -> Fixture:
     """
     if text in FIXTURES:
         return FIXTURES[text]
-    number = r"\s*(\d+\.?\d*|\.\d+)\s*"
+    number = r"\s*(\d+(?:\.\d*)?|\.\d+)\s*"
     match = re.fullmatch(f"window:{number}[xX×]{number},{number}[xX×]{number}", text)
     if match is None:
         raise ObjectError(f"{text!r} is not a fixture: {', '.join(FIXTURES)} or {CUSTOM}")

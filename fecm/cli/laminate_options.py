@@ -173,8 +173,8 @@ def laminate_options(
 
 def _lettered(text: str) -> tuple[str, str]:
     """Return letter and value of ``C=VALUE``; the letter is empty without one."""
-    match = re.fullmatch(rf"\s*({LETTER})\s*=\s*(.*)", text)
-    return (match[1], match[2]) if match else ("", text)
+    letter, equals, value = (part.strip() for part in text.partition("="))
+    return (letter, value) if equals and re.fullmatch(LETTER, letter) else ("", text)
 
 
 def _thickness(text: str) -> tuple[str, float]:

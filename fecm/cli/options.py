@@ -124,7 +124,7 @@ FILE_PATH = click.Path(path_type=Path, allow_dash=True)  # - is standard input o
 
 
 MOST_CHOICES = 8  # that a help page lists in the place of the value
-WITH_UNIT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[a-zA-Zµμ/]*[a-zA-Zµμ]")
+WITH_UNIT = re.compile(r"[+-]?(\d+(?:\.\d*)?|\.\d+)([eE][+-]?\d+)?\s*[a-zA-Zµμ/]*[a-zA-Zµμ]")
 
 
 class Finite(click.FloatRange):

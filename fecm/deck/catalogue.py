@@ -255,7 +255,7 @@ def _detect_format(text: str) -> str:
         return {"<": "XML", "{": "JSON"}[first_letter]
     try:
         json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         first = next((line for line in lines_of(text) if line.strip() and line[0] != "#"), "")
         is_table = "=" not in first and first_letter != "[" and re.search("[,;\t]", first)
         return "a table (CSV)" if is_table else ""

@@ -42,7 +42,7 @@ CONTACT = ("force", "indentation", "transducer", "displacement", "velocity", "ac
 _LABELS = re.compile(rb" *\d+")
 # The allowed letters occur in Infinity, in NaN and in exponents (E and D).
 _FOREIGN = re.compile(rb"[^0-9+\-. EDINFTYA]", re.IGNORECASE)
-_NUMBER = re.compile(rb"([+-]?(?:\d+\.?\d*|\.\d+))(?:[ED]([+-]?\d+)|([+-]\d+))?", re.IGNORECASE)
+_NUMBER = re.compile(rb"([+-]?(?:\d+(?:\.\d*)?|\.\d+))(?:[ED]([+-]?\d+)|([+-]\d+))?", re.IGNORECASE)
 _SPECIAL = re.compile(rb"[+-]?(?:inf(?:inity)?|nan)", re.IGNORECASE)
 
 

@@ -24,7 +24,7 @@ LARGEST = 0.1  # strain above which a table must be in another unit
 USUAL = (1e-5, 1e-2)  # largest strains of impacts that leave the plate linear
 DIVISORS = {"per cent": 100.0, "per mille": 1e3, "microstrain": 1e6}
 FEWEST = 10  # points of a table
-_NUMBER = re.compile(r"(?:gage|gauge|strain)?[ _-]?([0-9]+)")
+_NUMBER = re.compile(r"(?:gage|gauge|strain)?[ _-]?([0-9]{1,9})")
 
 
 class StrainTable(NamedTuple):

@@ -53,6 +53,9 @@ from fecm.mechanics.impact_sweep import Given as Given
 from fecm.mechanics.impact_sweep import ResultRow as ResultRow
 from fecm.mechanics.interpolation import NDOF as NDOF
 from fecm.mechanics.interpolation import interpolate as interpolate
+from fecm.mechanics.joints import coincident as coincident
+from fecm.mechanics.joints import representatives as representatives
+from fecm.mechanics.joints import sides_of_cells as sides_of_cells
 from fecm.mechanics.kernels import LIBRARY as LIBRARY
 from fecm.mechanics.kernels.element_groups import ElementKind as ElementKind
 from fecm.mechanics.kernels.failure import CompiledMonitor as CompiledMonitor

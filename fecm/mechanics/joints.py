@@ -105,22 +105,39 @@ def _shortest(sides: ElementSides, places: Floats) -> float:
 def coincident(places: Floats, sides: ElementSides) -> Indices:
     """Find pairs of nodes in the same place, (m, 2) rows.
 
-    The distance of such a pair is at most SAME times the shortest side.
+    The distance of such a pair is at most SAME times the shortest side. Of nodes with equal
+    coordinates, only the pairs with the lowest row are given: their number is not the square of
+    the number of nodes.
     """
-    distance = SAME * _shortest(sides, places)
+    shortest = _shortest(sides, places)
+    distance = SAME * shortest if np.isfinite(shortest) else 0.0
     along = places @ SLANT
-    order = np.argsort(along)
-    sorted_along = along[order]
     reach = STRETCH * distance
-    if not (np.diff(sorted_along) <= reach).any():
+    if not (np.diff(np.sort(along)) <= reach).any():
         return np.zeros((0, 2), np.intp)
+    lowest = _lowest_of_equal(places)
+    others = np.flatnonzero(lowest != np.arange(len(places)))
+    rows = np.delete(np.arange(len(places)), others)
+    order = rows[np.argsort(along[rows])]
+    sorted_along = along[order]
     last = np.searchsorted(sorted_along, sorted_along + reach, side="right")
     matches = [np.zeros((0, 2), np.intp)]
-    for first, second in _pairs(np.arange(1, len(places) + 1), last):
+    for first, second in _pairs(np.arange(1, len(rows) + 1), last):
         pairs = np.column_stack([order[first], order[second]])
         x, y = (places[pairs[:, 1]] - places[pairs[:, 0]]).T
         matches.append(pairs[np.hypot(x, y) <= distance])
-    return np.concatenate(matches)
+    near = np.concatenate(matches)
+    joined = representatives(len(places), near)[lowest[others]]
+    return np.concatenate([near, np.column_stack([joined, others])])
+
+
+def _lowest_of_equal(places: Floats) -> Indices:
+    """Return the lowest row among the nodes with the coordinates of each node, (count,)."""
+    order = np.lexsort(places.T)  # stable: the lowest row of equal ones is the first
+    is_first = np.append(True, (np.diff(places[order], axis=0) != 0.0).any(axis=1))
+    lowest = np.empty(len(places), np.intp)
+    lowest[order] = order[np.flatnonzero(is_first)][np.cumsum(is_first) - 1]
+    return lowest
 
 
 def hanging_nodes(sides: ElementSides, places: Floats) -> tuple[Indices, Indices]:

@@ -12,10 +12,9 @@ This reader is our own: pyNastran 1.4 requires NumPy 1, and refuses these bars.
 
 from __future__ import annotations
 
-import math
 import re
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -94,11 +93,17 @@ ALIKE_ELEMENTS = (
     "mesh the plate with triangles alone, or with quadrilaterals alone (in Gmsh, "
     "Mesh.SubdivisionAlgorithm = 1 splits all elements into quadrilaterals)"
 )
+INCLUDE = "INCLUDE"
+LONGEST_NAME = 1000  # characters of a line with the name of a file
 DEPTH = 10  # deepest nesting of INCLUDE
+LARGEST = 1e30  # coordinate: products of three are finite
+MOST_DIGITS = 18  # of a whole number
+SHOWN = 40  # characters of a field in a message
 MOST_SYSTEMS = 100  # within one another
 PARALLEL = 1e-9
-_NUMBER = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:[EeDd]?([+-]?[0-9]+))?")
-_INCLUDE = re.compile(r"\s*INCLUDE\s*(['\"]?)(.+?)\1\s*", re.IGNORECASE)
+_NUMBER = re.compile(
+    r"([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))(?:[EeDd]([+-]?[0-9]+)|([+-][0-9]+))?"
+)
 _OPEN_INCLUDE = re.compile(r"\s*INCLUDE\s*(?:'[^']*|\"[^\"]*)", re.IGNORECASE)
 _BULK = re.compile(r"\s*BEGIN\b", re.IGNORECASE)
 _SYSTEM = re.compile(r"CORD([12])([RCS])")
@@ -121,7 +126,7 @@ class NastranCard(NamedTuple):
 
     def error(self, keyword: str, what: str) -> NastranError:
         """Return an error that names the card."""
-        number = f" {self.fields[0]}" if self.fields and self.fields[0] else ""
+        number = f" {self.fields[0][:SHOWN]}" if self.fields and self.fields[0] else ""
         return NastranError(f"{self.place}: {keyword}{number} {what}")
 
     def text(self, place: int) -> str:
@@ -132,9 +137,10 @@ class NastranCard(NamedTuple):
         """Return the number in a field; 0 for a blank field."""
         text = self.text(place)
         match = _NUMBER.fullmatch(text) if text else None
-        value = float(f"{match[1]}e{match[2] or 0}") if match else 0.0
-        if (text and match is None) or not math.isfinite(value):
-            raise self.error(keyword, f"has `{text}`, which is not a finite number")
+        value = float(f"{match[1]}e{match[2] or match[3] or 0}") if match else 0.0
+        if (text and match is None) or abs(value) > LARGEST:
+            what = f"which is not a finite number up to {LARGEST:g}"
+            raise self.error(keyword, f"has `{text[:SHOWN]}`, {what}")
         return value
 
     def whole(self, keyword: str, place: int, default: int | None = None) -> int:
@@ -142,8 +148,8 @@ class NastranCard(NamedTuple):
         text = self.text(place)
         if not text and default is not None:
             return default
-        if not re.fullmatch(r"\+?[0-9]+", text):
-            shown = f"`{text}`" if text else "a blank field"
+        if not re.fullmatch(rf"\+?[0-9]{{1,{MOST_DIGITS}}}", text):
+            shown = f"`{text[:SHOWN]}`" if text else "a blank field"
             raise self.error(keyword, f"has {shown} in place of a whole number")
         return int(text)
 
@@ -293,8 +299,8 @@ class _Reader:
         if kind.offset is not None and card.real(keyword, kind.offset):
             raise card.error(
                 keyword,
-                f"has the offset ZOFFS {card.text(kind.offset)}; the nodes of a plate are in its "
-                "midplane: leave it out",
+                f"has the offset ZOFFS {card.text(kind.offset)[:SHOWN]}; the nodes of a plate are "
+                "in its midplane: leave it out",
             )
         if angle := card.text(kind.angle):
             self._check_angle(keyword, card, angle, kind.angle)
@@ -307,14 +313,14 @@ class _Reader:
     def _check_angle(self, keyword: str, card: NastranCard, angle: str, place: int) -> None:
         """Refuse an angle of the material; MCID may be a system along x."""
         if angle.isdecimal():
-            system = self._system(int(angle), keyword, card)
+            system = self._system(card.whole(keyword, place), keyword, card)
             if system.kind == "R" and abs(system.axes[0, 0] - 1.0) < PARALLEL:
                 return
             what = f"MCID {angle}"
         elif not card.real(keyword, place):
             return
         else:
-            what = f"THETA {angle}"
+            what = f"THETA {angle[:SHOWN]}"
         raise card.error(
             keyword,
             f"has {what}, which turns its plies; angles of plies are counted from x: turn the "
@@ -363,14 +369,15 @@ class _Reader:
 def _cards(path: Path) -> Iterator[tuple[str, NastranCard]]:
     """Yield the cards of the bulk data."""
     keyword, card, expected = "", NastranCard("", []), ""
-    for place, line in _lines(path, 0):
+    for place, line in _lines(path, 0, []):
         fields, name, here, follows = _fields(line)
         if name[:1] in ("", "+", "*"):
             if not keyword:
                 raise NastranError(f"{place}: a continuation without its card")
             if expected and here and expected != here:
                 raise NastranError(
-                    f"{place}: the continuation `{name}` does not follow its card; sort the cards"
+                    f"{place}: the continuation `{name[:SHOWN]}` does not follow its card; sort "
+                    "the cards"
                 )
             card.fields.extend(fields)
         else:
@@ -418,7 +425,8 @@ def _with_whole_includes(lines: list[str]) -> list[str]:
         if opened >= 0:
             whole[opened] += line.partition("$")[0].strip()
             whole.append("")
-            opened = -1 if whole[opened][-1:] in ("'", '"') else opened
+            is_whole = whole[opened][-1:] in ("'", '"') or len(whole[opened]) > LONGEST_NAME
+            opened = -1 if is_whole else opened
             continue
         whole.append(line)
         if _OPEN_INCLUDE.fullmatch(line):
@@ -427,9 +435,13 @@ def _with_whole_includes(lines: list[str]) -> list[str]:
     return whole
 
 
-def _lines(path: Path, depth: int) -> Iterator[tuple[str, str]]:
-    """Yield places and texts of the lines of bulk data, including other files."""
+def _lines(path: Path, depth: int, read: list[Path]) -> Iterator[tuple[str, str]]:
+    """Yield places and texts of the lines of bulk data, including other files.
+
+    `read` has the files that are read already. The first one is the main file.
+    """
     text = read_input(path).decode("latin-1")
+    read.append(path.resolve())
     lines = re.split("\r\n|\r|\n", text)
     lines = _with_whole_includes(lines)
     starts = [number for number, line in enumerate(lines) if _BULK.match(line)]
@@ -441,16 +453,43 @@ def _lines(path: Path, depth: int) -> Iterator[tuple[str, str]]:
             return
         if not line or line.startswith(("//", "#")):
             continue
-        if (match := _INCLUDE.fullmatch(line)) is None:
+        name = _included(line)
+        if not name:
             yield place, line
             continue
         if depth == DEPTH:
             raise NastranError(f"{place}: INCLUDE is nested deeper than {DEPTH} files")
-        included = path.parent / match[2]
+        included = path.parent / name
+        if fault := _fault(included, read):
+            raise NastranError(f"{place}: INCLUDE: {included} {fault}")
         try:
-            yield from _lines(included, depth + 1)
+            yield from _lines(included, depth + 1, read)
         except OSError as error:
             why = error.strerror or str(error)
             raise NastranError(
                 f"{place}: INCLUDE: {included} can't be read ({why}); put it beside this file"
             ) from None
+
+
+def _included(line: str) -> str:
+    """Return the name of the file that a line includes; empty if it includes none."""
+    word, name = line.lstrip()[: len(INCLUDE)], line.lstrip()[len(INCLUDE) :].strip()
+    if word.upper() != INCLUDE:
+        return ""
+    is_quoted = len(name) > 2 and name[0] == name[-1] and name[0] in "'\""
+    return name[1:-1] if is_quoted else name
+
+
+def _fault(included: Path, read: Sequence[Path]) -> str:
+    """Explain why a file is not included; empty if it is.
+
+    A file of another folder may not be meant for reading, and repeated files multiply.
+    """
+    if not str(included).isprintable():
+        return "is not the name of a file"
+    file, folder = included.resolve(), read[0].parent
+    if not file.is_relative_to(folder):
+        return f"is outside {folder}; put it beside the main file, or into a folder there"
+    if file in read:
+        return "is included before; delete this line"
+    return ""

@@ -40,7 +40,13 @@ from fecm.problem.abaqus_sets import (
     node_sets,
     nodes_and_elements,
 )
-from fecm.problem.mesh_readers import ALIKE_ELEMENTS, NastranError, physical_groups, read_nastran
+from fecm.problem.mesh_readers import (
+    ALIKE_ELEMENTS,
+    LARGEST,
+    NastranError,
+    physical_groups,
+    read_nastran,
+)
 
 Integers = NDArray[np.int_]
 # meshio's names of cells by their number of nodes, and by their number of corners.
@@ -59,7 +65,7 @@ PHYSICAL = "gmsh:physical"  # name of the numbers of physical groups
 XDMF = (".xdmf", ".xmf")  # whose data may be in other files
 FORM = re.compile(rb"""Format\s*=\s*["'](\w+)""", re.IGNORECASE)  # of such data
 NASTRAN = (".bdf", ".fem", ".nas")
-BULK = re.compile(rb"^\s*BEGIN[ ,]+BULK", re.IGNORECASE | re.MULTILINE)
+BULK = re.compile(rb"^[^\S\n]*BEGIN[ ,]+BULK", re.IGNORECASE | re.MULTILINE)
 # Elements of Abaqus that meshio knows by another name.
 ALIKE = {"S8": "S8R", "S6": "STRI65"}
 # Cards of Abaqus that may occur once, because meshio does not read further ones; and the remedy.
@@ -70,10 +76,6 @@ ABAQUS_ONCE = {
 }
 ABAQUS_UNREAD = (
     rb"\*(system|ngen|nfill|nmap|ncopy|elgen|elcopy)\s*(,|$)|\*node\s*,.*\bsystem\s*=\s*[cs]"
-)
-ABAQUS_GENERATE = re.compile(
-    rb"^\*(?:n|el)set\b[^\n]*\bgenerate\b[^\n]*\n((?:[^*\n][^\n]*\n?)*)",
-    re.IGNORECASE | re.MULTILINE,
 )
 HEAD = 10_000  # bytes that identify the program of a file
 SAME = 1e-9  # largest difference of equal coordinates, over the size of the mesh
@@ -307,13 +309,15 @@ def _check_abaqus(path: Path, text: bytes) -> None:
             f"{path}:{line}: `{card}` makes or moves nodes or elements, and is not read; write "
             "all of them in full, with coordinates x and y"
         )
-    for match in ABAQUS_GENERATE.finditer(text):
-        numbers = match[1].replace(b",", b" ").split()
-        if len(numbers) != 3 or not numbers[2].isdigit() or not int(numbers[2]):
-            line = text.count(b"\n", 0, match.start()) + 1
+    for generated in abaqus_cards(text.decode(errors="replace")):
+        if generated.keyword not in ("NSET", "ELSET") or "GENERATE" not in generated.parameters:
+            continue
+        numbers = " ".join(generated.data).replace(",", " ").split()
+        if len(numbers) != 3 or not re.fullmatch("0*[1-9][0-9]{0,17}", numbers[2]):
+            shown = " ".join(generated.data).strip()[:60]
             raise MeshError(
-                f"{path}:{line}: GENERATE has `{match[1].decode('latin-1').strip()[:60]}`; write "
-                "first, last and a positive increment in one line"
+                f"{path}:{generated.line}: GENERATE has `{shown}`; write first, last and a "
+                "positive increment in one line"
             )
 
 
@@ -332,8 +336,10 @@ def _why_unreadable(path: Path, text: bytes, error: BaseException, printed: str)
             "Mesh.SaveAll); save the mesh as MSH 2.2, or without SaveAll"
         )
     if path.suffix.lower() == ".inp" and "could not convert" in why:
-        for line in _lines_with(text, rb"\s*[0-9]+\s*(,[^,\n]*)*,\s*,[^\n]*[0-9]"):
-            return f"{path}:{line}: a coordinate is blank; write 0."
+        for line, row in enumerate(text.splitlines(), start=1):
+            first, *others = (field.strip() for field in row.rstrip(b" \t,").split(b","))
+            if first.isdigit() and b"" in others:
+                return f"{path}:{line}: a coordinate is blank; write 0."
         for line in _lines_with(text, rb"\s*[0-9]+\s*(,[^,\n]+){2,3},\s*$"):
             return f"{path}:{line}: a comma follows the last coordinate; delete it in all nodes"
     if lines := _lines_with(text, rb"\$ParametricNodes\b"):
@@ -455,10 +461,12 @@ def plate_mesh(
     try:
         places, nodes = np.array(points, float), np.array(cells)
         rows = {name: np.unique(np.asarray(group, int)) for name, group in groups.items()}
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise MeshError(f"{where}points, cells or groups are not arrays: {error}") from None
-    if places.ndim != 2 or places.shape[1] not in (2, 3) or not np.isfinite(places).all():
-        raise MeshError(f"{where}points must be finite numbers, (n, 2) or (n, 3)")
+    if places.ndim != 2 or places.shape[1] not in (2, 3):
+        raise MeshError(f"{where}points must be numbers, (n, 2) or (n, 3)")
+    if not (np.abs(places) <= LARGEST).all():
+        raise MeshError(f"{where}points must be finite numbers up to {LARGEST:g}")
     if nodes.ndim != 2 or nodes.shape[1] not in KINDS or nodes.dtype.kind not in "iu":
         raise MeshError(f"{where}cells must be integers, (m, k) with k one of 3, 4, 6, 8 and 9")
     nodes, size = nodes.astype(int), float(np.ptp(places[:, :2], axis=0).max(initial=0.0))

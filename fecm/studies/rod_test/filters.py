@@ -22,7 +22,7 @@ import numpy as np
 
 from fecm._errors import warn
 from fecm._inputs import open_input
-from fecm._measured_tables import UNITS, plain_unit, read_table
+from fecm._measured_tables import UNITS, is_column_number, plain_unit, read_table
 from fecm._typing import Floats
 from fecm.deck.reader import HDF5
 from fecm.results.result import Result, load
@@ -287,7 +287,7 @@ def _of_result(path: Path, result: Result, column: str | None) -> TimeHistory:
 def _of_table(path: Path, column: str | None) -> TimeHistory:
     table = read_table(path)
     heads = table.head[1]
-    if heads and column and not (column.isdecimal() or table.has(column)):
+    if heads and column and not (is_column_number(column) or table.has(column)):
         raise StudyError(f"{path} has no column {column}; it has {', '.join(table.names)}")
     if not (heads or column):
         columns = table.find(("time", "value"))
