@@ -65,7 +65,7 @@ from fecm.deck.model import Control, Gage
 from fecm.deck.units import MODULUS, quantity, unit_of, units_of
 from fecm.mechanics.laminate import are_cores
 from fecm.mechanics.points import RADIUS_PER_THICKNESS
-from fecm.mechanics.projectile import RigidMass, Rod
+from fecm.mechanics.projectile import DeckProjectile, RigidMass
 from fecm.problem.loading import load_deck
 from fecm.problem.parts import projectile_segment
 
@@ -121,7 +121,7 @@ def _notes_of_preload(deck: model.Deck, plies: DeckPlies) -> list[str]:
 
 
 MOST_STEPS = 1e6  # largest plausible number of steps; beyond it, `duration` may have a wrong unit
-AnyProjectile = Rod | RigidMass | model.Projectile
+AnyProjectile = DeckProjectile | model.Projectile
 GagePlace = tuple[float, float, float, float]  # x, y, z and degrees
 
 
@@ -198,7 +198,7 @@ class Authored(NamedTuple):
 def impact(
     plate: Plate,
     laminate: Laminate,
-    projectile: Rod | RigidMass | model.Projectile | None = None,
+    projectile: AnyProjectile | None = None,
     contact: model.Indentation | NamedContact | Sphere | str | None = None,
     *,
     velocity: float | str | None = None,
@@ -604,9 +604,9 @@ def _unit_segment(request: Request, plies: DeckPlies) -> model.Units | None:
 
 def _projectile_segment(projectile: AnyProjectile | None) -> model.Projectile | None:
     """Return the PROJ segment of a projectile; None for the rod of the report."""
-    if isinstance(projectile, Rod | RigidMass):
-        return projectile_segment(projectile)
-    return projectile
+    if projectile is None or isinstance(projectile, model.Projectile):
+        return projectile
+    return projectile_segment(projectile)
 
 
 def _preload_segment(request: Request, plies: DeckPlies) -> model.Preload | None:

@@ -21,12 +21,11 @@ from fecm.authoring.values import FAILURE_NAMES, OF_PLATE, strike_of_case
 from fecm.deck import model
 from fecm.deck.model import Deck
 from fecm.mechanics.contact_law import ContactParameters, Law, stack_parameters
-from fecm.mechanics.projectile import DeckProjectile, RigidMass
+from fecm.mechanics.projectile import DeckProjectile
 from fecm.problem.parts import constants_of
 from fecm.problem.problem import Problem
 from fecm.problem.rules.contact import limits_of
 
-UNIT = RigidMass(1.0)
 CONSTANTS = ("k", "alpha_p", "s_p", "q")
 MASSES = ("mass", "rod_mass")
 AS_COLUMNS = {"velocity", "energy", *CONSTANTS, *MASSES, *FAILURE_NAMES}
@@ -39,7 +38,7 @@ class Impacts:
     numbers: list[int]  # numbers of the cases, ascending
     velocity: Floats
     constants: ContactParameters[Floats]
-    kinds: list[DeckProjectile]  # different projectiles; a unit mass stands for all rigid masses
+    kinds: list[DeckProjectile]  # different projectiles; see `_unit`
     kind: Indices  # index into `kinds`
     mass: Floats
     scale: Floats  # factor for the mass and the stiffness of the kind
@@ -122,7 +121,7 @@ def impacts_from_cards(
     `factor` is the number of symmetric parts of the plate, of which the deck has one.
     """
     rows = list(strikes.values())
-    units = [UNIT if isinstance(row.projectile, RigidMass) else row.projectile for row in rows]
+    units = [_unit(row.projectile) for row in rows]
     kinds = {unit: place for place, unit in enumerate(dict.fromkeys(units))}
     mass = np.array([row.projectile.total_mass for row in rows])
     return Impacts(
@@ -132,7 +131,7 @@ def impacts_from_cards(
         kinds=list(kinds),
         kind=np.array([kinds[unit] for unit in units], dtype=np.intp),
         mass=mass,
-        scale=np.where([unit is UNIT for unit in units], mass, 1.0),
+        scale=mass / [unit.total_mass for unit in units],
         toughness=np.array([_toughness(row) for row in rows]),
         factor=factor,
         own_law=own_law,
@@ -172,8 +171,8 @@ def _fits_columns(strike: Strike, names: Collection[str]) -> bool:
 
     They can't hold the mass of a rod: a rod of another mass is another kind of projectile.
     """
-    rigid = isinstance(strike.projectile, RigidMass)
-    return AS_COLUMNS.issuperset(names) and (rigid or not {*MASSES}.intersection(names))
+    changes_mass = not {*MASSES}.isdisjoint(names)
+    return AS_COLUMNS.issuperset(names) and (strike.projectile.scales or not changes_mass)
 
 
 def _columns(
@@ -188,8 +187,8 @@ def _columns(
     `values` has the values of the cases by name. The strike of the deck has all other values.
     `factor` is the number of symmetric parts of the plate: energies are those of the whole plate.
     """
-    projectile, rigid = strike.projectile, isinstance(strike.projectile, RigidMass)
-    total = next((values[name] for name in MASSES if name in values), projectile.total_mass)
+    unit, stated_mass = _unit(strike.projectile), strike.projectile.total_mass
+    total = next((values[name] for name in MASSES if name in values), stated_mass)
     mass = np.array(np.broadcast_to(total, count))
     valid = mass > 0.0
     velocity = np.array(np.broadcast_to(values.get("velocity", strike.velocity), count))
@@ -211,16 +210,21 @@ def _columns(
         numbers=[],
         velocity=velocity,
         constants=constants_of(law.word, *stated),
-        kinds=[UNIT if rigid else projectile],
+        kinds=[unit],
         kind=np.zeros(count, dtype=np.intp),
         mass=mass,
-        scale=mass if rigid else np.ones(count),
+        scale=mass / unit.total_mass,
         toughness=toughness,
         factor=factor,
         own_law=None,
         cards=lambda row: strike,
     )
     return columns, valid
+
+
+def _unit(projectile: DeckProjectile) -> DeckProjectile:
+    """Return the projectile that stands for all multiples of a projectile in mass and stiffness."""
+    return projectile.with_total_mass(1.0) if projectile.scales else projectile
 
 
 def _toughness(strike: Strike) -> float:

@@ -25,7 +25,6 @@ from fecm.authoring.strike import strike_of, struck_layers
 from fecm.deck import model
 from fecm.deck.catalogue import STANDARD, named_ply, system_of
 from fecm.deck.material_cards import MATERIAL
-from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.parts import is_coupled, is_curved
 
 # Segments of a mesh and its supports.
@@ -66,9 +65,9 @@ class Objects(NamedTuple):
 
 def with_projectile(deck: model.Deck, projectile: AnyProjectile) -> model.Deck:
     """Return the deck with another projectile; a rod keeps the node of the transducer."""
-    if isinstance(projectile, Rod | RigidMass):
-        return strike_of(deck).with_projectile(projectile).deck()
-    return swapped(deck, deck.last(model.Projectile), projectile)
+    if isinstance(projectile, model.Projectile):
+        return swapped(deck, deck.last(model.Projectile), projectile)
+    return strike_of(deck).with_projectile(projectile).deck()
 
 
 def with_contact(deck: model.Deck, contact: AnyContact) -> model.Deck:

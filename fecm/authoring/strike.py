@@ -21,7 +21,7 @@ from fecm.deck.macros import compile_program
 from fecm.deck.units import MODULUS, in_si, unit_names, units_of
 from fecm.mechanics.contact_law import ContactParameters, hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
-from fecm.mechanics.projectile import DeckProjectile, RigidMass, Rod
+from fecm.mechanics.projectile import DeckProjectile
 from fecm.problem.check import check_impact, check_segment
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_constants, build_projectile, projectile_segment
@@ -69,9 +69,7 @@ class Strike(NamedTuple):
 
     def with_projectile(self, projectile: DeckProjectile) -> Strike:
         """Return the strike with another projectile; a rod keeps the transducer of the deck."""
-        transducer = 0
-        if self.card is not None and isinstance(projectile, Rod):
-            transducer = self.card.transducer
+        transducer = self.card.transducer if self.card is not None and projectile.elements else 0
         card = projectile_segment(projectile, transducer)
         return self._replace(card=card, projectile=projectile)
 
@@ -196,20 +194,22 @@ def set_toughness(strike: Strike, value: Value) -> Strike:
 
 def set_mass(strike: Strike, value: Value) -> Strike:
     """Change the mass of the projectile; for a rod, scale its density."""
-    projectile, mass = strike.projectile, float(value)
-    if isinstance(projectile, RigidMass):
-        return strike.with_projectile(RigidMass(mass))
-    density = projectile.density * mass / projectile.total_mass
-    return strike.with_projectile(replace(projectile, density=density))
+    return strike.with_projectile(strike.projectile.with_total_mass(float(value)))
 
 
-def rod_property(name: str, field: str) -> StrikeSetter:
-    """Return the setter of a field of the rod; `name` is the name of the value in messages."""
+def projectile_value(name: str) -> StrikeSetter:
+    """Return the setter of a value of the projectile, by its name in sweeps."""
 
     def set_field(strike: Strike, value: Value) -> Strike:
-        if isinstance(strike.projectile, RigidMass):
-            raise CasesError(f"{name}: the projectile of the deck is a rigid mass")
-        fields: dict[str, Any] = {field: float(value)}  # mypy compares each with every field
-        return strike.with_projectile(replace(strike.projectile, **fields))
+        projectile = strike.projectile
+        if name not in projectile.values:
+            raise CasesError(f"{name}: {lacks_value(projectile)}")
+        fields: dict[str, Any] = {projectile.values[name]: float(value)}
+        return strike.with_projectile(replace(projectile, **fields))
 
     return set_field
+
+
+def lacks_value(projectile: DeckProjectile) -> str:
+    """Explain that a projectile does not have a value that is varied or fitted."""
+    return f"the projectile of the deck is a {projectile.kind}"

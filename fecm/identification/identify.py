@@ -16,7 +16,7 @@ from fecm._options import documented, option
 from fecm._table import Table, html_table
 from fecm._typing import Floats
 from fecm._watch import SILENT, StoppedError, Watch
-from fecm.authoring.strike import strike_of
+from fecm.authoring.strike import lacks_value, strike_of
 from fecm.deck.model import Deck, Impact, Indentation, Nonlinear, Projectile
 from fecm.deck.units import unit_names
 from fecm.identification.alignment import IdentifyError, check_measured, lags
@@ -51,7 +51,6 @@ from fecm.identification.misfit import (
 from fecm.identification.result import CARDS, Identification
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import law_name, own_law
-from fecm.mechanics.projectile import RigidMass
 from fecm.problem.loading import AnyDeck
 from fecm.problem.memory import needed_bytes
 from fecm.problem.parts import build_projectile
@@ -443,16 +442,16 @@ def _start(deck: Deck, name: str) -> float:
     """Return the value at which the fit of a parameter starts."""
     if name in OF_RECORD:
         return 0.0
-    rod = build_projectile(deck)
+    projectile = build_projectile(deck)
     if name == "mass":
-        return rod.total_mass
+        return projectile.total_mass
     if name == "energy":
-        return 0.5 * rod.total_mass * deck.require(Impact).velocity ** 2
+        return 0.5 * projectile.total_mass * deck.require(Impact).velocity ** 2
     if CARDS[name] is not Projectile:
         return float(getattr(deck.require(CARDS[name]), name))
-    if isinstance(rod, RigidMass):
-        raise StudyError(f"{name}: the projectile of the deck is a rigid mass")
-    return float(getattr(rod, name.removeprefix("rod_")))
+    if name not in projectile.values:
+        raise StudyError(f"{name}: {lacks_value(projectile)}")
+    return float(getattr(projectile, projectile.values[name]))
 
 
 def _points_left_out(fit: Identification, measured: Measurement) -> str:

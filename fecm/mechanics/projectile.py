@@ -8,9 +8,11 @@ direction.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar, runtime_checkable
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -58,14 +60,37 @@ class LinearProjectile(Protocol):
         """
 
 
-class OwnProjectile:
+class LumpedBody:
+    """What a projectile without elements along its axis says of itself.
+
+    A transducer on such a body measures the contact force.
+    """
+
+    elements: ClassVar[int] = 0  # elements of the axis, whose nodes may have a transducer
+    element_time: ClassVar[float] = math.inf  # time in which a wave passes an element
+
+    @property
+    def name(self) -> str:
+        """Name of the class, for messages and results."""
+        return type(self).__name__
+
+    def with_mass(self, mass: str) -> Self:
+        """Return the same projectile: it has one mass matrix, lumped or consistent."""
+        return self
+
+    def transducer_force(self, station: Transducer, force: Floats, gradient: Floats) -> Floats:
+        """Return the force at the transducer, (rows,): the contact force."""
+        return -station.sign * force
+
+
+class OwnProjectile(LumpedBody):
     """A user's projectile with checked matrices and the interface of :class:`Rod`.
 
     Raises ProjectileError if the matrices do not describe one free body.
     """
 
     def __init__(self, projectile: LinearProjectile) -> None:
-        self.name: str = type(projectile).__name__
+        self._name = type(projectile).__name__
         if isinstance(projectile, type):
             raise ProjectileError(
                 f"projectile {projectile.__name__} is a class; pass an object of it: "
@@ -88,6 +113,11 @@ class OwnProjectile:
         self._check_free(K)
         self._inertia = M
         self.total_mass: float = float(self.rigid @ M @ self.rigid)
+
+    @property
+    def name(self) -> str:
+        """Name of the user's class."""
+        return self._name
 
     def _check_free(self, K: Floats) -> None:
         """Raise ProjectileError unless the rigid motion is the only motion without a force."""
@@ -121,10 +151,6 @@ class OwnProjectile:
 
     def _error(self, fault: str) -> ProjectileError:
         return ProjectileError(f"projectile {self.name}: {fault}")
-
-    def with_mass(self, mass: str) -> OwnProjectile:
-        """Return the same projectile; the user's mass matrix is kept."""
-        return self
 
     def stiffness(self) -> Floats:
         """Return the stiffness matrix, (n, n)."""
@@ -202,6 +228,17 @@ def _check_numbers(kind: str, **values: object) -> None:
 class Rod:
     """A straight elastic rod of equal elements."""
 
+    kind: ClassVar[str] = "elastic rod"
+    # Fields that a sweep varies and a fit frees, by the names of their values.
+    values: ClassVar[Mapping[str, str]] = {
+        "rod_length": "length",
+        "rod_modulus": "modulus",
+        "rod_density": "density",
+    }
+    # Whether mass and stiffness are proportional to the total mass, so that a body of unit mass
+    # stands for all of the kind.
+    scales: ClassVar[bool] = False
+
     length: float
     diameters: tuple[float, ...]  # diameter of each element, starting at the impacted end
     modulus: float  # Young's modulus, force/area
@@ -227,6 +264,11 @@ class Rod:
             shape = f"Rod.cylinder({self.length!r}, {diameter!r}, {self.modulus!r}, "
             shape += f"{self.density!r}, elements={self.elements}"
         return f"{shape}, consistent=True)" if self.consistent else f"{shape})"
+
+    @property
+    def name(self) -> str:
+        """Name of the class, for messages and results."""
+        return type(self).__name__
 
     @property
     def elements(self) -> int:
@@ -261,6 +303,20 @@ class Rod:
     def with_mass(self, mass: str) -> Rod:
         """Return the rod with another mass matrix, ``"lumped"`` or ``"consistent"``."""
         return replace(self, consistent=mass == CONSISTENT)
+
+    def with_total_mass(self, mass: float) -> Rod:
+        """Return the rod with another total mass, by its density."""
+        return replace(self, density=self.density * mass / self.total_mass)
+
+    @property
+    def element_time(self) -> float:
+        """Time in which a wave passes an element."""
+        return self.element_length * math.sqrt(self.density / self.modulus)
+
+    def transducer_force(self, station: Transducer, force: Floats, gradient: Floats) -> Floats:
+        """Return the force at the node of the transducer, E A du/dx, (rows,)."""
+        area = float(self.areas[min(station.node, self.elements) - 1])
+        return station.sign * self.modulus * area * gradient
 
     def mass(self) -> Floats:
         """Return the lumped mass, (n,), or the consistent mass, (n, n)."""
@@ -309,17 +365,21 @@ def _energy(matrix: Floats, x: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class RigidMass:
+class RigidMass(LumpedBody):
     """A projectile that does not deform, with one dof."""
+
+    kind: ClassVar[str] = "rigid mass"
+    values: ClassVar[Mapping[str, str]] = {}
+    scales: ClassVar[bool] = True
 
     total_mass: float
 
     def __post_init__(self) -> None:
         _check_numbers("RigidMass", total_mass=self.total_mass)
 
-    def with_mass(self, mass: str) -> RigidMass:
-        """Return the same projectile: lumped and consistent mass are equal."""
-        return self
+    def with_total_mass(self, mass: float) -> RigidMass:
+        """Return a rigid body of another mass."""
+        return RigidMass(mass)
 
     @property
     def rigid(self) -> Floats:
@@ -343,7 +403,8 @@ class RigidMass:
         return np.zeros(len(deformation))
 
 
-DeckProjectile = Rod | RigidMass  # projectiles that PROJ can describe
+# Projectiles that PROJ can describe. Each says what it is; see the attributes of Rod.
+DeckProjectile = Rod | RigidMass
 Projectile = DeckProjectile | OwnProjectile
 
 
@@ -352,11 +413,6 @@ def own_projectile(projectile: Projectile | LinearProjectile | None) -> Projecti
     if projectile is None or isinstance(projectile, Projectile):
         return projectile
     return OwnProjectile(projectile)
-
-
-def projectile_name(projectile: Projectile) -> str:
-    """Return the class name of a user's projectile, for messages and results."""
-    return projectile.name if isinstance(projectile, OwnProjectile) else type(projectile).__name__
 
 
 class Transducer(NamedTuple):

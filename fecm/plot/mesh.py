@@ -16,7 +16,7 @@ from fecm.mechanics.projectile import Rod
 from fecm.plot import data, style
 from fecm.plot.kinds import Picture, PlotError, Width
 from fecm.plot.plate import aspect, draw_circle
-from fecm.problem.parts import build_projectile
+from fecm.problem.parts import build_projectile, rod_of_deck
 from fecm.results.result import Result
 from fecm.results.summary import radii_of
 
@@ -110,11 +110,13 @@ def mesh_picture(
 
 
 def _rod(result: Result, name: str) -> Rod:
-    """Return the rod of a result; raise PlotError if its projectile is a rigid mass."""
-    projectile = build_projectile(data.result_deck(result, name))
-    if not isinstance(projectile, Rod):
-        raise PlotError(f"the projectile of {name} is a rigid mass, which has no elements to draw")
-    return projectile
+    """Return the rod of a result; raise PlotError if its projectile is not a rod."""
+    deck = data.result_deck(result, name)
+    rod = rod_of_deck(deck)
+    if rod is None:
+        kind = build_projectile(deck).kind
+        raise PlotError(f"the projectile of {name} is a {kind}, which has no elements to draw")
+    return rod
 
 
 def _draw_rod(axes: Axes, rod: Rod, place: style.AxisScale) -> None:

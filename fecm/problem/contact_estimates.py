@@ -12,7 +12,6 @@ from fecm._typing import Floats
 from fecm.deck import model
 from fecm.mechanics.laminate import LaminateSection, effective_rigidity
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
-from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.parts import build_constants, build_projectile
@@ -86,8 +85,7 @@ def contact_step(
     weights = contact[plate.mesh.equations > 0]
     stiffness = contact_stiffness(deck, plate, factor)
     projectile = build_projectile(deck)
-    rigid = isinstance(projectile, RigidMass)
-    tip = projectile.total_mass if rigid else float(projectile.mass()[0])
+    tip = float(projectile.mass()[0])
     at_node = 1.0 / float((weights**2 / plate.mass).sum())
     mass = min(tip, at_node)
     if not stiffness > 0.0:

@@ -83,16 +83,23 @@ def build_projectile(deck: Deck, variant: ImpactVariant = REPORT_IMPACT) -> Deck
     return Rod(card.size, tuple(rod_diameters(card).tolist()), card.modulus, card.density)
 
 
-def projectile_segment(rod: DeckProjectile, transducer: int = 0) -> model.Projectile:
+def projectile_segment(projectile: DeckProjectile, transducer: int = 0) -> model.Projectile:
     """Return the PROJ segment of a projectile."""
-    if isinstance(rod, RigidMass):
-        return model.Projectile(0, 0, rod.total_mass)
-    cards = [RodDiameter(n, 0, diameter) for n, diameter in enumerate(rod.diameters, start=1)]
-    if len(set(rod.diameters)) == 1 < len(cards):  # those between two cards are generated
-        cards = [replace(cards[0], increment=1), cards[-1]]
-    return model.Projectile(
-        rod.elements, transducer, rod.length, rod.modulus, rod.density, tuple(cards)
-    )
+    match projectile:
+        case RigidMass(mass):
+            return model.Projectile(0, 0, mass)
+        case Rod(length, diameters, modulus, density):
+            cards = [RodDiameter(n, 0, diameter) for n, diameter in enumerate(diameters, start=1)]
+            if len(set(diameters)) == 1 < len(cards):  # those between two cards are generated
+                cards = [replace(cards[0], increment=1), cards[-1]]
+            elements = len(diameters)
+            return model.Projectile(elements, transducer, length, modulus, density, tuple(cards))
+
+
+def rod_of_deck(deck: Deck) -> Rod | None:
+    """Return the rod of a deck; None if its projectile is of another kind."""
+    projectile = build_projectile(deck)
+    return projectile if isinstance(projectile, Rod) else None
 
 
 def build_constants(measured: model.Indentation) -> contact_law.ContactParameters:
@@ -120,7 +127,7 @@ def build_station(
 
     A user's projectile does not have PROJ's node.
     """
-    if not isinstance(projectile, Rod):
+    if not projectile.elements:
         return Transducer(0, variant.station_sign)
     card = None if is_own else deck.last(model.Projectile)
     middle = projectile.elements // 2 + 1 + variant.station_after_middle

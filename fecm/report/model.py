@@ -26,7 +26,6 @@ from fecm.deck.units import (
     unit_names,
     unit_of,
 )
-from fecm.mechanics.projectile import RigidMass
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
 from fecm.problem.summary import rise_of
@@ -179,8 +178,7 @@ def impactor(result: Result, deck: model.Deck) -> Impactor | None:
     if math.isfinite(energy) and velocity:
         mass = 2.0 * energy / velocity**2
     user_projectile = result.attributes.get("projectile")
-    kind = "rigid mass" if isinstance(projectile, RigidMass) else "elastic rod"
-    name = f"{user_projectile}, instead of PROJ" if user_projectile else kind
+    name = f"{user_projectile}, instead of PROJ" if user_projectile else projectile.kind
     return Impactor(name, mass, velocity, 0.5 * mass * velocity**2)
 
 

@@ -25,7 +25,7 @@ from fecm._errors import FecmError
 from fecm._files import beside, naming, open_ordinary, packed, sync
 from fecm._typing import Array
 from fecm._version import __version__
-from fecm.mechanics import kernels, projectile
+from fecm.mechanics import kernels
 from fecm.mechanics.own_law import law_name
 from fecm.mechanics.stiffness_product import KERNELS
 from fecm.problem.problem import Problem
@@ -122,7 +122,7 @@ def identity(simulation: Simulation) -> dict[str, Any]:
         ],
         "a run with another contact law": None if options.law is None else law_name(options.law),
         "a run with another projectile": (
-            None if options.projectile is None else projectile.projectile_name(options.projectile)
+            None if options.projectile is None else options.projectile.name
         ),
         "a run with other failure criteria": [criterion.name for criterion in options.criteria]
         or None,

@@ -16,7 +16,6 @@ from fecm.deck.macros import WorkEstimate
 from fecm.mechanics.failure import CRITERIA
 from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.plate_motion import DofSums, PlateState
-from fecm.mechanics.projectile import Rod
 from fecm.mechanics.strains import STRAINS, midplane_height
 from fecm.problem.build import ImpactModel
 from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA
@@ -246,17 +245,11 @@ class StepRecorder:
         }
         self._table[len(SCALARS) : len(NAMES), rows] = [columns[name] for name in PROJECTILE]
 
-    def _transducer(self, force: Floats, deformation: Floats) -> Floats:
-        """Return the force at the transducer, E A du/dx of its node.
-
-        A rigid mass has the contact force instead.
-        """
-        sign = self._station.sign
-        rod = None if self._impact is None else self._impact.rod
-        if not isinstance(rod, Rod):
-            return -sign * force
-        area = float(rod.areas[min(self._station.node, rod.elements) - 1])
-        return sign * rod.modulus * area * deformation
+    def _transducer(self, force: Floats, gradient: Floats) -> Floats:
+        """Return the force at the transducer; the contact force, zero, in a run without impact."""
+        if self._impact is None:
+            return -self._station.sign * force
+        return self._impact.rod.transducer_force(self._station, force, gradient)
 
 
 Steps = Sequence[int]  # of rows

@@ -11,7 +11,6 @@ import numpy as np
 from fecm.deck.model import Cure, Deck, Material
 from fecm.deck.units import unit_names
 from fecm.listing.slips import mode_of
-from fecm.mechanics import projectile
 from fecm.mechanics.elements import nodal
 from fecm.mechanics.failure import MODES, largest_in_plies
 from fecm.mechanics.own_law import law_name
@@ -109,7 +108,7 @@ def _own_parts(options: RunOptions) -> dict[str, str]:
     if options.law is not None:
         parts["law"] = law_name(options.law)
     if options.projectile is not None:
-        parts["projectile"] = projectile.projectile_name(options.projectile)
+        parts["projectile"] = options.projectile.name
     return parts
 
 

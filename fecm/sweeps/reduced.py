@@ -23,7 +23,6 @@ from fecm.authoring.timing import duration_of
 from fecm.authoring.values import strike_of_case
 from fecm.mechanics.contact_law import ContactPoint
 from fecm.mechanics.impact import ContactState, couple_step
-from fecm.mechanics.projectile import Rod
 from fecm.mechanics.reduced_plate import (
     ReducedMotion,
     ReducedPlate,
@@ -160,13 +159,11 @@ def largest_time_step(plate: ReducedPlate, strike: Strike) -> float:
     width = indentation - float(law.permanent(indentation))
     compliance = min(indentation / 1.5, width / law.q) / force + plate.flexibility
     mobility = float((plate.deflection**2).sum())
-    largest = min(
+    return min(
         PLATE_PHASE * math.sqrt(compliance / mobility),
         PROJECTILE_PHASE * math.sqrt(compliance * strike.projectile.total_mass),
+        strike.projectile.element_time,
     )
-    if isinstance(rod := strike.projectile, Rod):
-        largest = min(largest, rod.element_length * math.sqrt(rod.density / rod.modulus))
-    return largest
 
 
 RunTasks = Callable[[Sequence[Task]], list[tuple[Task, Outcome]]]

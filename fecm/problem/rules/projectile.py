@@ -11,7 +11,7 @@ from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, declare, rule
 from fecm.deck.units import KNOWN, MASS, in_si, unit_names
 from fecm.mechanics.projectile import Rod, report_rod
-from fecm.problem.parts import build_projectile
+from fecm.problem.parts import build_projectile, rod_of_deck
 from fecm.problem.problem import Problem
 from fecm.problem.rules.cards import ranges
 from fecm.problem.rules.units import looks_like
@@ -176,11 +176,11 @@ def doubtful_rod(problem: Problem) -> Reports:
 
     Remedy: Modulus and density in the ply's units.
     """
-    card, projectile = problem.deck.last(model.Projectile), build_projectile(problem.deck)
-    if card is None or not isinstance(projectile, Rod):
+    card, rod = problem.deck.last(model.Projectile), rod_of_deck(problem.deck)
+    if card is None or rod is None:
         return
     ply = problem.deck.require(model.Material).ply
-    speed = math.sqrt(projectile.modulus / projectile.density)
+    speed = math.sqrt(rod.modulus / rod.density)
     share = speed / math.sqrt(ply.e1 / ply.density)
     if not SLOWEST <= share <= FASTEST:
         what = f"The wave speed in the rod, (E/density)^(1/2) = {speed:.3g}"
@@ -197,14 +197,14 @@ def rod_thicker_than_long(problem: Problem) -> Reports:
 
     Remedy: The length on PROJ's card, the diameters on the cards below; or a rigid mass.
     """
-    card, projectile = problem.deck.last(model.Projectile), build_projectile(problem.deck)
-    if card is None or not isinstance(projectile, Rod):
+    card, rod = problem.deck.last(model.Projectile), rod_of_deck(problem.deck)
+    if card is None or rod is None:
         return
-    thickest = max(projectile.diameters)
-    if thickest > projectile.length:
+    thickest = max(rod.diameters)
+    if thickest > rod.length:
         message = (
             f"The rod is thicker than long: its diameter is {thickest:g}, its length "
-            f"{projectile.length:g}. They look exchanged."
+            f"{rod.length:g}. They look exchanged."
         )
         hint = "a body that is not slender is a rigid mass (0 elements)"
         yield Report(message, card.place("length or mass"), hint)

@@ -22,11 +22,10 @@ from fecm.mechanics.projectile import (
     MASSES,
     Integrator,
     MassMatrix,
-    RigidMass,
     Rod,
 )
 from fecm.problem.loading import sole_problem
-from fecm.problem.parts import build_projectile, build_station
+from fecm.problem.parts import build_projectile, build_station, rod_of_deck
 from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.studies.rod_test.pulse_test import (
     Pulse,
@@ -193,15 +192,16 @@ def uniform_rod(rod: Rod, units: str | None) -> Struck:
 def rod_of(deck: Deck) -> Struck:
     """Return the rod of a checked deck.
 
-    Raises StudyError if the projectile is a rigid mass.
+    Raises StudyError if the projectile is not a rod.
     """
-    projectile = build_projectile(deck)
-    if isinstance(projectile, RigidMass):
-        raise StudyError("the projectile is a rigid mass; a pulse needs a rod")
-    node = build_station(deck, projectile).node
-    station = (node - 1) * projectile.length / projectile.elements
+    rod = rod_of_deck(deck)
+    if rod is None:
+        kind = build_projectile(deck).kind
+        raise StudyError(f"the projectile is a {kind}; a pulse needs a rod")
+    node = build_station(deck, rod).node
+    station = (node - 1) * rod.length / rod.elements
     steps = [macro.value for macro in deck.macros if macro.word == "DT" and macro.value > 0.0]
-    return Struck(projectile, station, steps[0] if steps else None, unit_names(deck))
+    return Struck(rod, station, steps[0] if steps else None, unit_names(deck))
 
 
 def simulate_rod_test(
