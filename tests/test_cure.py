@@ -18,10 +18,9 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm import Deck
+from fecm import Deck, Strengths
 from fecm.deck import (
     MATERIALS,
-    Allowables,
     Cure,
     Expansion,
     Preload,
@@ -40,7 +39,7 @@ from fecm.mechanics import (
     residual_stresses,
 )
 from fecm.mechanics.laminate import laminate
-from fecm.problem import load_deck
+from fecm.problem import load_deck, strengths_of_deck
 from fecm.results import ALL_CRITERIA, EXPOSURES, LargestExposure, largest_exposures
 from fecm.simulation import Simulation, run_program
 from fecm.sweeps import in_full
@@ -176,7 +175,7 @@ def test_the_first_ply_fails_at_the_load_of_the_exact_solution(row: dict[str, st
 
 
 def test_the_factor_of_a_single_stress_is_that_of_the_closed_form() -> None:
-    card = Allowables(1500.0, 1500.0, 40.0, 246.0, 68.0, 68.0, 68.0)
+    card = Strengths(1500.0, 1500.0, 40.0, 246.0, 68.0, 68.0, 68.0)
     rest, pull = np.array([0.0, 21.0, 0.0]), np.array([0.0, 10.0, 0.0])
     for name in ("max_stress", "hashin", "puck", "tsai_wu"):
         assert failure_load_factor(card, CRITERIA[name], rest, pull) == pytest.approx(
@@ -207,7 +206,8 @@ def cooled(dt: float, every: int = 1) -> Deck:
 
 def test_fail_judges_the_sum_of_residual_and_mechanical_stresses() -> None:
     found = fecm.run_one(cooled(-100.0))
-    card = fecm.read_one(failing()).require(Allowables)
+    ((card, *_),) = strengths_of_deck(fecm.read_one(failing()))
+    assert card is not None
     (problem,) = load_deck(cooled(-100.0)).problems
     assert problem.residual is not None
     stresses = problem.residual.stresses

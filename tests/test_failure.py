@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,23 +29,10 @@ from fecm.mechanics import (
     tsai_wu,
 )
 from fecm.mechanics.laminate import laminate
+from fecm.problem import ply_strengths
 from tests.builders import Floats, table
 
-
-@dataclass(frozen=True)
-class Ply5:
-    """Strengths of T300/5208 (Tsai and Hahn), MPa."""
-
-    xt: float = 1500.0
-    xc: float = 1500.0
-    yt: float = 40.0
-    yc: float = 246.0
-    s12: float = 68.0
-    s13: float = 68.0
-    s23: float = 50.0
-    f12: float = -0.5
-    p_plus: float = 0.35
-    p_minus: float = 0.3
+T300 = Strengths(1500.0, 1500.0, 40.0, 246.0, 68.0, 68.0, 50.0)  # T300/5208 (Tsai and Hahn), MPa
 
 
 def evaluate(
@@ -75,9 +62,10 @@ COLUMNS = {
 }  # fmt: skip
 
 
-def one(row: dict[str, str]) -> tuple[Ply5, list[Floats]]:
+def one(row: dict[str, str]) -> tuple[Strengths, list[Floats]]:
     xt, xc, yt, yc, s12 = (float(row[name]) for name in ("XT", "XC", "YT", "YC", "S12"))
-    ply = Ply5(xt, xc, yt, yc, s12, p_plus=float(row["p+"]), p_minus=float(row["p-"]))
+    slopes = {"p_plus": float(row["p+"]), "p_minus": float(row["p-"])}
+    ply = Strengths(xt, xc, yt, yc, s12, 68.0, 50.0, **slopes)
     return ply, [np.array([float(row[name])]) for name in ("s1", "s2", "t12")]
 
 
@@ -115,7 +103,7 @@ def test_the_fracture_angle_of_mode_c_is_that_of_the_reference_vectors() -> None
 def test_the_textbooks_lamina_fails_at_the_printed_stress() -> None:
     # Kaw 2006, examples 2.17 to 2.20: a ply at 60 degrees under S (2, -3, 4).
     stress = [np.array([KAW[name]]) for name in ("s1/S", "s2/S", "t12/S")]
-    ply = Ply5(xt=1500.0, xc=1500.0, yt=40.0, yc=246.0, s12=68.0)
+    ply = replace(T300, xt=1500.0, xc=1500.0, yt=40.0, yc=246.0, s12=68.0)
     names = {max_stress: "S, max stress (MPa)", tsai_wu: "S, Tsai-Wu F12*=-1/2 (MPa)"}
     for criterion, name in names.items():
         exposure, _ = evaluate(criterion, ply, *stress)
@@ -128,7 +116,7 @@ def test_the_first_ply_of_the_textbooks_laminate_fails_at_the_printed_load() -> 
     plate = laminate(ply, (0.0, 90.0, 0.0), (0.005, 0.005, 0.005))
     strains = np.linalg.solve(plate.A, [1.0, 0.0, 0.0])
     stresses = in_plane_stresses(plate) @ np.concatenate([strains, np.zeros(3)])
-    pascal = Ply5(1.5e9, 1.5e9, 40e6, 246e6, 68e6)
+    pascal = Strengths(1.5e9, 1.5e9, 40e6, 246e6, 68e6, 68e6, 50e6)
     for layer, name in ((0, "strength ratio, 0 deg ply"), (1, "strength ratio, 90 deg ply")):
         exposure, _ = evaluate(tsai_wu, pascal, *stresses[layer, 0])
         assert 1.0 / exposure == pytest.approx(KAW[name], rel=1e-5)
@@ -142,14 +130,14 @@ def test_exposures_are_linear_in_the_load(s1: float, s2: float, tau: float, load
     stress = np.array([s1, s2, tau])[:, None]
     for criterion in CRITERIA.values():
         once, scaled = (
-            evaluate(criterion, Ply5(), *stress)[0],
-            evaluate(criterion, Ply5(), *(load * stress))[0],
+            evaluate(criterion, T300, *stress)[0],
+            evaluate(criterion, T300, *(load * stress))[0],
         )
         assert scaled[0] == pytest.approx(load * once[0], rel=1e-9, abs=1e-12 * load)
 
 
 def test_pucks_modes_meet_without_a_jump() -> None:
-    ply = Ply5()
+    ply = T300
     resistance, critical = puck_limits(ply)
     tau = np.array([30.0])
     for edge, step in ((0.0, 1e-9), (-30.0 * resistance / critical, 1e-9)):
@@ -167,6 +155,7 @@ def test_at_a_single_strength_every_criterion_that_holds_has_exposure_1(ply: str
     named = MATERIALS[ply]
     known = named.allowables("mm-N-s")
     assert known is not None
+    strengths = ply_strengths(known, named.converted("mm-N-s"))
     s1 = np.array([known.xt, -known.xc, 0.0, 0.0, 0.0])
     s2 = np.array([0.0, 0.0, known.yt, -known.yc, 0.0])
     tau = np.array([0.0, 0.0, 0.0, 0.0, known.s12])
@@ -175,14 +164,14 @@ def test_at_a_single_strength_every_criterion_that_holds_has_exposure_1(ply: str
     names = [name for name in CRITERIA if is_evaluated(name, fabric=fabric)]
     assert len(names) == len(CRITERIA) - fabric
     for name in names:
-        exposure, _ = evaluate(CRITERIA[name], known, s1, s2, tau)
+        exposure, _ = evaluate(CRITERIA[name], strengths, s1, s2, tau)
         np.testing.assert_allclose(exposure, 1.0, rtol=1e-12, err_msg=name)
 
 
 @given(st.floats(1.0, 1e3), st.floats(1.0, 1e3), st.floats(0.01, 0.99))
 def test_pucks_exposure_at_yt_is_1_whatever_its_slope(yt: float, s12: float, slope: float) -> None:
     stress = np.zeros(1), np.array([yt]), np.zeros(1)
-    exposure, _ = evaluate(puck, Ply5(yt=yt, s12=s12, p_plus=slope), *stress)
+    exposure, _ = evaluate(puck, replace(T300, yt=yt, s12=s12, p_plus=slope), *stress)
     assert exposure[0] == pytest.approx(1.0, rel=1e-9)
 
 

@@ -13,7 +13,6 @@ import pytest
 import fecm
 from fecm import Ply, Strengths
 from fecm._typing import Floats
-from fecm.deck import Allowables
 from fecm.mechanics import (
     CRITERIA,
     CompiledMonitor,
@@ -38,7 +37,7 @@ from tests.test_failure_runs import failing
 pytestmark = pytest.mark.skipif(kernels.LIBRARY is None, reason="the kernels are not compiled")
 
 PLY = Ply(1.0, 0.28, 181e3, 10.3e3, 7.17e3, 7.17e3, 3.68e3)
-STRENGTHS = Allowables(1500.0, 1500.0, 40.0, 246.0, 68.0, 90.0, 60.0)
+STRENGTHS = Strengths(1500.0, 1500.0, 40.0, 246.0, 68.0, 90.0, 60.0)
 ANGLES = (45.0, 0.0, -45.0, 90.0, 90.0, -45.0, 0.0, 45.0)
 CURVED = (0.02, -0.01, 0.005)
 
@@ -146,7 +145,7 @@ def zones(*, stretches: bool) -> Monitors:
     rows = np.array([0, 2, 3, 7, 9]), np.array([1, 4, 5, 6, 8, 10, 11])
     stacks = [laminate(PLY, angles, [0.125] * len(angles)) for angles in (ANGLES, ANGLES[:3])]
     weak = replace(STRENGTHS, xt=300.0, yt=20.0, s13=10.0)
-    strengths: list[list[Allowables | None]] = [
+    strengths: list[list[Strengths | None]] = [
         [*[STRENGTHS] * 3, None, *[weak] * 4],
         [weak, STRENGTHS, STRENGTHS],
     ]

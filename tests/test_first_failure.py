@@ -11,9 +11,8 @@ import pytest
 import fecm
 from fecm import Result
 from fecm._typing import Bools
-from fecm.deck import Allowables
 from fecm.mechanics import CRITERIA, FailureEnvelope, Largest, Maxima, PlyStresses, exposure_of
-from fecm.problem import load_deck
+from fecm.problem import load_deck, strengths_of_deck
 from fecm.results import evaluations_in_contact, first_failures
 from tests.calls import call
 from tests.decks import DATA_CARDS, DISC, PROGRAM, small
@@ -49,7 +48,8 @@ def histories(found: Result) -> dict[str, np.ndarray]:
     """Largest exposure outside the load at every stored row, from the ply stresses."""
     (problem,) = load_deck(failing()).problems
     stresses = PlyStresses(problem.mesh, problem.laminate, problem.rules[2])
-    card = problem.deck.require(Allowables)
+    ((card, *_),) = strengths_of_deck(problem.deck)
+    assert card is not None
     outside = found["failure/under_load"] == 0
     rows = [stresses.evaluate(field) for field in found["tape3/displacement"]]
     return {

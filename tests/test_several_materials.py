@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm import Ply, Result
+from fecm import Ply, Result, Strengths
 from fecm.deck import (
     MATERIALS,
     ElementGrid,
@@ -52,7 +52,7 @@ from fecm.mechanics import (
     symmetry_reduction,
 )
 from fecm.mechanics.laminate import laminate
-from fecm.problem import load_deck
+from fecm.problem import load_deck, strengths_of_deck
 from fecm.simulation import Solver
 from fecm.verification import decks
 from tests.builders import Floats, table
@@ -395,11 +395,10 @@ def test_stresses_and_exposures_are_those_of_each_elements_own_laminate() -> Non
     (problem,) = load_deck(unlike()).problems
     plate, rule = problem.plate, problem.rules[2]
     field = np.random.default_rng(1).normal(size=(len(problem.mesh.coordinates), 5))
-    strengths = [
-        replace(problem.deck.require(model.Allowables), xt=1000.0 * n, s13=40.0 * n, others=())
-        for n in (1, 2, 3)
-    ]
-    of_plies: list[list[model.Allowables | None]] = [
+    known = strengths_of_deck(problem.deck)[0][0]
+    assert known is not None
+    strengths = [replace(known, xt=1000.0 * n, s13=40.0 * n) for n in (1, 2, 3)]
+    of_plies: list[list[Strengths | None]] = [
         [strengths[one.material - 1] for one in own] for own in problem.deck.layers.values()
     ]
     of_plies[1][1] = None
@@ -437,12 +436,14 @@ def test_stresses_and_exposures_are_those_of_each_elements_own_laminate() -> Non
 
 def test_an_interface_of_unlike_materials_takes_the_weaker_strength() -> None:
     (problem,) = load_deck(impact(layup=((0.0, 0.5, 1), (0.0, 0.5, 1)))).problems
-    strong = replace(problem.deck.require(model.Allowables), s13=80.0, s23=30.0)
+    known = strengths_of_deck(problem.deck)[0][0]
+    assert known is not None
+    strong = replace(known, s13=80.0, s23=30.0)
     weak = replace(strong, s13=20.0, s23=60.0)
     field = np.random.default_rng(2).normal(size=(len(problem.mesh.coordinates), 5))
     stresses = PlyStresses(problem.mesh, problem.laminate, problem.rules[2])
 
-    def exposures(*strengths: model.Allowables) -> Floats:
+    def exposures(*strengths: Strengths) -> Floats:
         monitor = FailureMonitor(stresses, [strengths])
         envelope = monitor.start()
         monitor.update(envelope, field[None], [1.0])

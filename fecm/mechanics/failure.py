@@ -46,12 +46,24 @@ Codes = NDArray[np.int8]
 Candidates = tuple[tuple[str, Floats], ...]
 
 
-# Frozen, so that read-only attributes match; without generated methods, which take 0.4 ms.
-@dataclass(frozen=True, init=False, eq=False, repr=False, match_args=False)
-class Strengths(Protocol):
-    """Strengths of a ply, all positive (force/area), and dimensionless constants."""
+@dataclass(frozen=True)
+class Strengths:
+    """Strengths of a ply, all positive (force/area), with what else a criterion may need.
 
-    # Strengths along and across the fibres, in tension and compression; strengths in shear.
+    Attributes
+    ----------
+    xt, xc, yt, yc : float
+        Strengths along and across the fibres, in tension and compression (force/area).
+    s12, s13, s23 : float
+        Strengths in shear (force/area).
+    f12, p_plus, p_minus : float
+        Tsai and Wu's F12*, and Puck's slopes.
+    e1, e2, g12 : float
+        Moduli of the ply (force/area); NaN where they are unknown.
+    nu12 : float
+        Poisson's ratio of the ply; NaN where it is unknown.
+    """
+
     xt: float
     xc: float
     yt: float
@@ -59,10 +71,13 @@ class Strengths(Protocol):
     s12: float
     s13: float
     s23: float
-    f12: float  # Tsai and Wu's F12*
-    # Puck's slopes.
-    p_plus: float
-    p_minus: float
+    f12: float = -0.5
+    p_plus: float = 0.35
+    p_minus: float = 0.3
+    e1: float = math.nan
+    e2: float = math.nan
+    nu12: float = math.nan
+    g12: float = math.nan
 
 
 def largest_modes(

@@ -17,6 +17,7 @@ from fecm.problem.parts import build_plate as build_plate
 from fecm.problem.parts import build_projectile as build_projectile
 from fecm.problem.parts import is_coupled as is_coupled
 from fecm.problem.parts import laminates_of_deck as laminates_of_deck
+from fecm.problem.parts import ply_strengths as ply_strengths
 from fecm.problem.parts import strengths_of_deck as strengths_of_deck
 from fecm.problem.plate_mesh import PlateMesh as PlateMesh
 from fecm.problem.plate_mesh import read_mesh as read_mesh

@@ -19,6 +19,7 @@ from fecm.mechanics import contact_law
 from fecm.mechanics.contact_law import Number
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
+from fecm.mechanics.failure import Strengths
 from fecm.mechanics.laminate import LaminateSection, laminate
 from fecm.mechanics.mesh import Ints, MeshArrays
 from fecm.mechanics.plate import UNLOADED, PlateModel
@@ -194,11 +195,35 @@ def residuals_of_deck(
     return tuple(residuals)
 
 
-def strengths_of_deck(deck: Deck) -> list[list[model.Allowables | None]]:
+def strengths_of_deck(deck: Deck) -> list[list[Strengths | None]]:
     """Return the strengths of the plies of each laminate; None where ALLO lacks them."""
-    card = deck.require(model.Allowables)
-    layups = deck.layers.values()
-    return [[card.of(layer.material) for layer in layers] for layers in layups]
+    first = deck.require(model.Allowables)
+    strengths = {
+        number: ply_strengths(card, ply)
+        for number, ply in deck.plies.items()
+        if (card := first.of(number)) is not None
+    }
+    return [[strengths.get(layer.material) for layer in layers] for layers in deck.layers.values()]
+
+
+def ply_strengths(card: model.Allowables, ply: model.Ply) -> Strengths:
+    """Return the strengths of a material on its card of ALLO, with the moduli of its ply."""
+    return Strengths(
+        xt=card.xt,
+        xc=card.xc,
+        yt=card.yt,
+        yc=card.yc,
+        s12=card.s12,
+        s13=card.s13,
+        s23=card.s23,
+        f12=card.f12,
+        p_plus=card.p_plus,
+        p_minus=card.p_minus,
+        e1=ply.e1,
+        e2=ply.e2,
+        nu12=ply.nu12,
+        g12=ply.g12,
+    )
 
 
 def materials_of_deck(deck: Deck) -> Ints | None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.mechanics.exposures import Evaluations, FailureEnvelope
-from fecm.mechanics.failure import CRITERIA, MODES, Strengths, puck_limits, puck_slope
+from fecm.mechanics.failure import MODES, Strengths, puck_limits, puck_slope
 from fecm.mechanics.failure_monitor import FailureMonitor, PlyRun, ZoneCriteria
 from fecm.mechanics.kernels import LIBRARY, Codes, Doubles, Longs, Structure, filled, floats
 from fecm.mechanics.kernels.strains import MidplaneStruct, midplanes
@@ -143,6 +143,8 @@ class ExposuresStruct(Structure):
     )
 
 
+# Criteria of the kernels, which are the first of CRITERIA. NumPy evaluates the others.
+COMPILED = ("max_stress", "tsai_wu", "hashin", "puck")
 # Pruning needs exposures whose rounding errors are below TIE.  Beyond this ratio of strengths in
 # tension and compression, or beyond this F12*, the sum in Tsai and Wu's root cancels.
 LARGEST_RATIO = 1e4
@@ -191,23 +193,23 @@ class CompiledMonitor(FailureMonitor):
         self, envelope: FailureEnvelope, fields: Floats, times: Sequence[float]
     ) -> Evaluations:
         """Raise the exposures; see :meth:`FailureMonitor.update`."""
-        if len(self.criteria) > len(CRITERIA) or self.circle is not None:
+        if len(self.criteria) > len(COMPILED) or self.circle is not None:
             return super().update(envelope, fields, times)
         return self._update_built_in(envelope, fields, times)
 
     def _evaluate(self, envelope: FailureEnvelope, displacement: Floats, time: float) -> None:
-        """Raise the exposures, first with the kernel's criteria, then with user-defined ones."""
+        """Raise the exposures, first with the kernel's criteria, then with the others."""
         if not self.has_interfaces:  # the kernel can't compute the strains on the circle
             strains, _ = self.stresses.strains(displacement)
             kept = self._kept(envelope).strain
             kept[...] = strains[..., 6 - kept.shape[2] :]
         self._update_built_in(envelope, displacement[None], [time])
-        if len(self.criteria) == len(CRITERIA):
+        if len(self.criteria) == len(COMPILED):
             return
         strains = self._kept(envelope).strain
         if not self.stresses.stretches:
             strains = np.concatenate([np.zeros(strains.shape), strains], axis=2)
-        self._raise_plies(range(len(CRITERIA), len(self.criteria)), envelope.plies, strains, time)
+        self._raise_plies(range(len(COMPILED), len(self.criteria)), envelope.plies, strains, time)
         envelope.find_largest(self.counts, self.far, strains)
 
     def _update_built_in(

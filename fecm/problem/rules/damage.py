@@ -13,6 +13,7 @@ from fecm.deck.rules import Report, Reports, Subject, reports, rule
 from fecm.deck.units import MODULUS, TOUGHNESS, in_si, unit_names
 from fecm.mechanics.failure import puck_slope
 from fecm.mechanics.laminate import is_fabric
+from fecm.problem.parts import ply_strengths
 from fecm.problem.problem import Problem
 from fecm.problem.rules.units import USED, has_real_moduli, likely_unit, looks_like, needed_unit
 from fecm.problem.rules.zones import material_numbers, unknown_material
@@ -418,7 +419,8 @@ def limited_slope(problem: Problem) -> Reports:
     """
     for card, ply in _strengths(problem):
         is_endless = card.yt > ENDLESS * ply.e2
-        if is_fabric(ply) or is_endless or (slope := puck_slope(card)) == card.p_plus:
+        slope = puck_slope(ply_strengths(card, ply))
+        if is_fabric(ply) or is_endless or slope == card.p_plus:
             continue
         message = (
             f"Puck's slope p+ = {card.p_plus:g} is above S12/YT = {slope:.3g}, which is taken "
