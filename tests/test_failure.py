@@ -32,7 +32,9 @@ from fecm.mechanics.laminate import laminate
 from fecm.problem import ply_strengths
 from tests.builders import Floats, table
 
-T300 = Strengths(1500.0, 1500.0, 40.0, 246.0, 68.0, 68.0, 50.0)  # T300/5208 (Tsai and Hahn), MPa
+# T300/5208 (Tsai and Hahn), MPa.
+MODULI = {"e1": 181e3, "e2": 10.3e3, "nu12": 0.28, "g12": 7.17e3}
+T300 = Strengths(1500.0, 1500.0, 40.0, 246.0, 68.0, 68.0, 50.0, **MODULI)
 
 
 def evaluate(

@@ -37,7 +37,8 @@ from tests.test_failure_runs import failing
 pytestmark = pytest.mark.skipif(kernels.LIBRARY is None, reason="the kernels are not compiled")
 
 PLY = Ply(1.0, 0.28, 181e3, 10.3e3, 7.17e3, 7.17e3, 3.68e3)
-STRENGTHS = Strengths(1500.0, 1500.0, 40.0, 246.0, 68.0, 90.0, 60.0)
+MODULI = {"e1": PLY.e1, "e2": PLY.e2, "nu12": PLY.nu12, "g12": PLY.g12}
+STRENGTHS = Strengths(1500.0, 1500.0, 40.0, 246.0, 68.0, 90.0, 60.0, **MODULI)
 ANGLES = (45.0, 0.0, -45.0, 90.0, 90.0, -45.0, 0.0, 45.0)
 CURVED = (0.02, -0.01, 0.005)
 

@@ -34,7 +34,8 @@ from tests.decks import PROGRAM, small
 from tests.patches import equilibrium
 from tests.test_patch import rectangle
 
-STRENGTHS = Strengths(1.5e9, 1.5e9, 40e6, 246e6, 68e6, 68e6, 68e6)
+MODULI = {"e1": 181e9, "e2": 10.3e9, "nu12": 0.28, "g12": 7.17e9}
+STRENGTHS = Strengths(1.5e9, 1.5e9, 40e6, 246e6, 68e6, 68e6, 68e6, **MODULI)
 ALLO = "ALLO\n   200000.   200000.     7000.    28000.    13000.\n\nEXPE"
 
 
