@@ -94,6 +94,14 @@ class MacroNumber(Enum):
     TOLERANCE = auto()  # positive
 
 
+class StoredRows(Enum):
+    """Rows that a macro stores, besides those of time steps."""
+
+    NONE = auto()
+    EVERY_NTH_PASS = auto()  # one
+    N_EACH_TIME = auto()
+
+
 class Word(NamedTuple):
     """Word of the macro language."""
 
@@ -104,6 +112,7 @@ class Word(NamedTuple):
     needs: tuple[tuple[str, ...], ...] = ()
     inside: bool = False  # whether it belongs inside a loop
     second: bool = False  # whether it takes a second number, an integer of at least 0
+    rows: StoredRows = StoredRows.NONE
 
 
 A_MASS = ("LMAS", "CMAS")
@@ -137,8 +146,19 @@ WORDS = {
             needs=(("SOLV",),),
             inside=True,
         ),
-        Word("REAC", "Stores and prints the reactions.", needs=(A_SOLUTION,)),
-        Word("EIGE", "Finds the N lowest natural modes.", MacroNumber.EVERY, needs=(A_MASS,)),
+        Word(
+            "REAC",
+            "Stores and prints the reactions.",
+            needs=(A_SOLUTION,),
+            rows=StoredRows.N_EACH_TIME,
+        ),
+        Word(
+            "EIGE",
+            "Finds the N lowest natural modes.",
+            MacroNumber.EVERY,
+            needs=(A_MASS,),
+            rows=StoredRows.N_EACH_TIME,
+        ),
         Word("EXCD", "Takes one step of central differences.", needs=EXPLICIT),
         Word(
             "RODP",
@@ -146,19 +166,31 @@ WORDS = {
             MacroNumber.EVERY,
             needs=EXPLICIT,
         ),
-        Word("DISP", "Stores displacements at every N-th pass of the loop.", MacroNumber.EVERY),
+        Word(
+            "DISP",
+            "Stores displacements at every N-th pass of the loop.",
+            MacroNumber.EVERY,
+            rows=StoredRows.EVERY_NTH_PASS,
+        ),
         Word(
             "STRE",
             "Stores and prints strains and stress resultants at every N-th pass.",
             MacroNumber.EVERY,
+            rows=StoredRows.EVERY_NTH_PASS,
         ),
         Word(
             "PLYS",
             "Stores ply stresses at every N-th pass, in the M elements nearest to the load or all.",
             MacroNumber.EVERY,
             second=True,
+            rows=StoredRows.EVERY_NTH_PASS,
         ),
-        Word("FAIL", "Evaluates the failure criteria at every N-th pass.", MacroNumber.EVERY),
+        Word(
+            "FAIL",
+            "Evaluates the failure criteria at every N-th pass.",
+            MacroNumber.EVERY,
+            rows=StoredRows.EVERY_NTH_PASS,
+        ),
         Word("CHEC", "Reports mesh and storage."),
     )
 }
@@ -328,7 +360,7 @@ class WorkEstimate(NamedTuple):
     macros: int  # executed macros; each pass of a loop executes its NEXT
     steps: int  # time steps, impact steps and central differences
     contact_rows: int  # steps that store contact and strains
-    passes: Counter[str]  # number of times that DISP, STRE, REAC and EIGE store something, by word
+    passes: Counter[str]  # rows by the word that stores them, see `StoredRows`
 
 
 def estimate_work(body: Body) -> WorkEstimate:
@@ -341,11 +373,12 @@ def estimate_work(body: Body) -> WorkEstimate:
     steps = Counter[int]()  # by the number of RODP; 0 for EXCD
     for macro, count, outer in _executed(body):
         macros += count * outer
-        if macro.word in ("DISP", "STRE", "PLYS", "FAIL"):
-            passes[macro.word] += count // every(macro) * outer
-        elif macro.word in ("REAC", "EIGE"):
-            passes[macro.word] += count * outer * every(macro)
-        elif macro.word in STEPS:
+        match WORDS[macro.word].rows:
+            case StoredRows.EVERY_NTH_PASS:
+                passes[macro.word] += count // every(macro) * outer
+            case StoredRows.N_EACH_TIME:
+                passes[macro.word] += count * outer * every(macro)
+        if macro.word in STEPS:
             steps[every(macro) if macro.word == "RODP" else 0] += count * outer
     total = sum(steps.values())
     impact = {n: count for n, count in steps.items() if n}

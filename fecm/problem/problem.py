@@ -43,10 +43,14 @@ from fecm.problem.parts import (
     strengths_of_deck,
 )
 from fecm.problem.symmetry import Symmetry, symmetry_of
+from fecm.results.groups import GROUPS
+from fecm.results.schema import values_per_row
 from fecm.results.validity import Judge, in_plane_of
 
 if TYPE_CHECKING:
     from fecm.mechanics.ply_stresses import Residual
+
+MEMBRANE_VALUES = 10  # numbers in a row of the group `membrane`
 
 
 class Threshold(NamedTuple):
@@ -441,25 +445,29 @@ class Problem:
         """Size of the result's large datasets, by the macro that stores them."""
         control, work = self.deck.control, self.work
         an_element = len(self.rules[2].xi)
-        points, field = control.numel * an_element, control.numnp * control.ndf
+        points = control.numel * an_element
         gages = len(segment.records) if (segment := self.deck.last(model.Gages)) else 0
         layers = max(map(len, self.deck.layers.values()))
         chosen = next((int(m.second) for m in flat(self.program) if m.word == "PLYS"), 0)
-        plies = (chosen or control.numel) * (layers * (6 * an_element + 6) + 2)
-        history = work.steps * (18 + gages + bool(self.damping))
-        row = 10 if self.deck.has(model.Nonlinear) else 0  # of `membrane`
-        numbers = {
-            "DISP": work.passes["DISP"] * (field + control.numnp + row),
-            "STRE": work.passes["STRE"] * points * 16,
-            "REAC": work.passes["REAC"] * field,
-            "EIGE": work.passes["EIGE"] * field,
-            "PLYS": work.passes["PLYS"] * plies,
-            "FAIL": (
-                min(1, work.passes["FAIL"]) * 9 * points * layers * 2  # both faces of a ply
-                + work.passes["FAIL"] * len(CRITERIA) * 5
-            ),
-            "RODP": work.contact_rows * (points * 5 + 8 + row) + history,
+        sizes = {
+            **{"numnp": control.numnp, "ndf": control.ndf, "numel": control.numel},
+            **{"nps": an_element, "npp": an_element, "layers": layers},
+            "members": chosen or control.numel,
         }
+        numbers = {
+            info.macro: work.passes[info.macro] * values_per_row(group, sizes)
+            for group, info in GROUPS.items()
+            if info.by_pass
+        }
+        numbers["FAIL"] = (
+            min(1, work.passes["FAIL"]) * 9 * points * layers * 2  # both faces of a ply
+            + work.passes["FAIL"] * len(CRITERIA) * 5
+        )
+        history = work.steps * (18 + gages + bool(self.damping))
+        numbers["RODP"] = work.contact_rows * (points * 5 + 8) + history
+        if self.deck.has(model.Nonlinear):
+            numbers["DISP"] += work.passes["DISP"] * MEMBRANE_VALUES
+            numbers["RODP"] += work.contact_rows * MEMBRANE_VALUES
         return {word: 8 * count for word, count in numbers.items()}
 
     @property

@@ -40,7 +40,6 @@ from fecm.results.pictures import RunKind as RunKind
 from fecm.results.pictures import SweepKind as SweepKind
 from fecm.results.schema import DATASETS as DATASETS
 from fecm.results.schema import FILES as FILES
-from fecm.results.schema import GROUP_TYPES as GROUP_TYPES
 from fecm.results.schema import Form as Form
 from fecm.results.schema import dataset_of as dataset_of
 from fecm.results.sinks import MemorySink as MemorySink

@@ -30,7 +30,7 @@ from fecm.deck.units import column_name
 from fecm.results import schema
 from fecm.results.criteria import criteria_of
 from fecm.results.exposures import LOWER_BOUNDS
-from fecm.results.groups import STORED_BY, ExportError, NotStoredError, remedy, suggestion
+from fecm.results.groups import ExportError, NotStoredError, remedy, stored_by, suggestion
 from fecm.results.hdf5_writer import new_hdf5
 from fecm.results.plate_fields import Fields, Ints, Note, plate_fields, vtk_cells, vtk_points
 from fecm.results.plies import IN_PLANE, INTERLAMINAR, rows_at
@@ -134,7 +134,7 @@ def _members(result: Stored, name: str) -> list[str]:
         order = list(schema.DATASETS)
         return sorted(members, key=lambda path: order.index(path) if path in order else len(order))
     group = name.partition("/")[0]
-    if group in STORED_BY and not any(path.startswith(f"{group}/") for path in result):
+    if stored_by(group) and not any(path.startswith(f"{group}/") for path in result):
         raise ExportError(f"the result has no {name}{remedy(name)}")
     raise ExportError(f"the result has no dataset {name}{suggestion(name, result)}")
 

@@ -26,41 +26,21 @@ class ExportError(FecmError, ValueError):
 
 
 class GroupInfo(NamedTuple):
-    """Description of a group before any run."""
+    """What is known of a group before any run."""
 
+    kind: type[ResultGroup]
     description: str
-    macro: str = ""  # that stores it; empty if every run does, or a segment asks for it
+    macro: str  # that stores it; empty if every run does, or a segment asks for it
+    by_pass: bool  # whether the rows are those that the macro counts, and nothing else adds rows
 
 
-GROUPS = {
-    "mesh": GroupInfo("the finite element mesh"),
-    "laminate": GroupInfo("stiffness of the laminate per area"),
-    "tape3": GroupInfo("nodal displacements, stored by DISP", "DISP"),
-    "tape8": GroupInfo("element strains, stored by RODP", "RODP"),
-    "tape9": GroupInfo("contact and the projectile, stored by RODP", "RODP"),
-    "history": GroupInfo(
-        "contact and the projectile at every step; row n is the state after step n", "RODP"
-    ),
-    "energy": GroupInfo("energies at every step", "RODP"),
-    "gages": GroupInfo("strain gages, read at every step", "RODP or EXCD"),
-    "membrane": GroupInfo(
-        "stretching of a nonlinear plate, at the rows of tape8, or of tape3 without impact"
-    ),
-    "stresses": GroupInfo("strains and stress resultants, stored by STRE", "STRE"),
-    "patch": GroupInfo("nodal weights of the contact force"),
-    "plies": GroupInfo("stresses ply by ply, stored by PLYS", "PLYS"),
-    "threshold": GroupInfo(
-        "delamination threshold: force of `number` delaminations, first crossing, margin of the "
-        "peak; band: forces of one delamination in each of the `interfaces`, and of a single one"
-    ),
-    "failure": GroupInfo("largest exposures over time, found by FAIL", "FAIL"),
-    "exposures": GroupInfo(
-        "largest exposures so far outside the load, at every evaluation of FAIL", "FAIL"
-    ),
-    "reactions": GroupInfo("forces of the supports, stored by REAC", "REAC"),
-    "modes": GroupInfo("natural modes, found by EIGE", "EIGE"),
-}
-STORED_BY = {name: info.macro for name, info in GROUPS.items() if info.macro}
+# Groups of a run by name. The classes of schema.py enter themselves.
+GROUPS: dict[str, GroupInfo] = {}
+
+
+def stored_by(group: str) -> str:
+    """Return the macro that stores a group; empty if no macro does."""
+    return GROUPS[group].macro if group in GROUPS else ""
 
 
 def check_name(name: object, explanation: str) -> str:
@@ -116,7 +96,7 @@ def suggestion(asked: str, paths: Iterable[str], others: Iterable[str] = ()) -> 
 
 def remedy(path: str) -> str:
     """Return the end of a message about a missing dataset: the macro that stores it, if any."""
-    macro = STORED_BY.get(path.partition("/")[0])
+    macro = stored_by(path.partition("/")[0])
     return f"; add {macro} to the deck's program and run it again" if macro else ""
 
 
@@ -156,6 +136,14 @@ class ResultGroup:
     source : Source
         The result.
     """
+
+    def __init_subclass__(
+        cls, *, group: str = "", about: str = "", macro: str = "", by_pass: bool = False
+    ) -> None:
+        """Enter the class in :data:`GROUPS` under the name of its group, if it has one."""
+        super().__init_subclass__()
+        if group:
+            GROUPS[group] = GroupInfo(cls, about, macro, by_pass)
 
     def __init__(self, name: str, source: GroupSource) -> None:
         self._name = name

@@ -12,7 +12,7 @@ from fecm._typing import AnyFile, Floats
 from fecm.deck.model import Deck
 from fecm.results import schema
 from fecm.results.end import End
-from fecm.results.groups import NotStoredError, ResultGroup, not_stored
+from fecm.results.groups import GROUPS, NotStoredError, ResultGroup, not_stored
 from fecm.results.metrics import METRICS, MetricAttributes
 from fecm.results.run_metrics import ImpactMetrics, end_of, metrics_of
 from fecm.results.stored import Stored
@@ -385,7 +385,7 @@ class Result(Stored, schema.ContactRows, MetricAttributes):
             if f"history/{name}" in self._arrays:
                 return self[f"history/{name}"]
             if any(path.startswith(f"{name}/") for path in self._arrays):
-                return schema.GROUP_TYPES.get(name, ResultGroup)(name, self)
+                return (GROUPS[name].kind if name in GROUPS else ResultGroup)(name, self)
             metrics = self.metrics
             if name in METRICS:
                 return metrics[name]

@@ -11,6 +11,7 @@ of a sweep use ``cases``, ``steps``, ``combinations`` (of varied values), ``laws
 ``limits`` and ``trials`` (of the reduced model).
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -136,7 +137,7 @@ class ContactRows:
 CONTACT = tuple(ContactRows.__annotations__)
 
 
-class MeshGroup(ResultGroup):
+class MeshGroup(ResultGroup, group="mesh", about="the finite element mesh"):
     """The finite element mesh."""
 
     coordinates: Annotated[Floats, "numnp ndm", "nodal coordinates", "length"]
@@ -152,7 +153,7 @@ class MeshGroup(ResultGroup):
     ]
 
 
-class LaminateStiffness(ResultGroup):
+class LaminateStiffness(ResultGroup, group="laminate", about="stiffness of the laminate per area"):
     """Stiffness of the laminate per area. Several laminates have a group each, by number."""
 
     A: Annotated[Floats, "3 3", "extensional stiffness, order xx, yy, xy", "force/length"]
@@ -161,7 +162,9 @@ class LaminateStiffness(ResultGroup):
     shear: Annotated[Floats, "2 2", "transverse shear stiffness, order xz, yz", "force/length"]
 
 
-class Tape3(Rows):
+class Tape3(
+    Rows, group="tape3", about="nodal displacements, stored by DISP", macro="DISP", by_pass=True
+):
     """Displacements of the nodes, stored by DISP."""
 
     w: Annotated[Floats, "rows numnp", "transverse displacement of every node", "length"]
@@ -173,7 +176,7 @@ class Tape3(Rows):
     ]
 
 
-class Tape8(Rows):
+class Tape8(Rows, group="tape8", about="element strains, stored by RODP", macro="RODP"):
     """Strains of the elements, stored by RODP."""
 
     kappa_x: Annotated[_Strain, "curvature -theta_x,x at every point of every element", "1/length"]
@@ -183,11 +186,23 @@ class Tape8(Rows):
     gamma_xz: Annotated[_Strain, "transverse shear strain w,x - theta_x"]
 
 
-class Tape9(ContactRows, Rows):
+class Tape9(
+    ContactRows,
+    Rows,
+    group="tape9",
+    about="contact and the projectile, stored by RODP",
+    macro="RODP",
+):
     """Contact and projectile, stored by RODP."""
 
 
-class HistoryRows(ContactRows, Rows):
+class HistoryRows(
+    ContactRows,
+    Rows,
+    group="history",
+    about="contact and the projectile at every step; row n is the state after step n",
+    macro="RODP",
+):
     """Contact and projectile at every step."""
 
     plate_w: Annotated[
@@ -195,7 +210,7 @@ class HistoryRows(ContactRows, Rows):
     ]
 
 
-class Energy(Rows):
+class Energy(Rows, group="energy", about="energies at every step", macro="RODP"):
     """Energies at every step."""
 
     plate_kinetic: Annotated[_Energy, "kinetic energy of the plate", "force*length"]
@@ -214,14 +229,20 @@ class Energy(Rows):
     ]
 
 
-class GageGroup(Rows):
+class GageGroup(
+    Rows, group="gages", about="strain gages, read at every step", macro="RODP or EXCD"
+):
     """Strain gages, read at every step."""
 
     number: Annotated[Int32s, "gages", "number of every gage"]
     strain: Annotated[Floats, "rows gages", "normal strain of every gage in its direction"]
 
 
-class MembraneRows(Rows):
+class MembraneRows(
+    Rows,
+    group="membrane",
+    about="stretching of a nonlinear plate, at the rows of tape8, or of tape3 without impact",
+):
     """Stretching of a nonlinear plate, at the rows of tape8, or of tape3 without impact."""
 
     energy: Annotated[
@@ -246,7 +267,13 @@ class MembraneRows(Rows):
     ]
 
 
-class Stresses(Rows):
+class Stresses(
+    Rows,
+    group="stresses",
+    about="strains and stress resultants, stored by STRE",
+    macro="STRE",
+    by_pass=True,
+):
     """Strains and stress resultants, stored by STRE."""
 
     x: Annotated[Floats, "numel nps", "x of every point of every element", "length"]
@@ -269,14 +296,16 @@ class Stresses(Rows):
     Q_y: Annotated[_Stress, "transverse shear force", "force/length"]
 
 
-class PatchGroup(ResultGroup):
+class PatchGroup(ResultGroup, group="patch", about="nodal weights of the contact force"):
     """Nodal weights of the contact force."""
 
     node: Annotated[Int32s, "patch_nodes", "numbers of the nodes that share the contact force"]
     weight: Annotated[Floats, "patch_nodes", "share of every node in the contact force"]
 
 
-class PlyRows(Rows):
+class PlyRows(
+    Rows, group="plies", about="stresses ply by ply, stored by PLYS", macro="PLYS", by_pass=True
+):
     """Stresses ply by ply, stored by PLYS."""
 
     element: Annotated[Int32s, "members", "number of every element with ply stresses"]
@@ -331,7 +360,18 @@ class CircleExposures(ResultGroup):
     points: Annotated[Int32s, "", "number of points on the circle with this exposure"]
 
 
-class FailureGroup(ResultGroup):
+class ThresholdGroup(
+    ResultGroup,
+    group="threshold",
+    about="delamination threshold: force of `number` delaminations, first crossing, margin of "
+    "the peak; band: forces of one delamination in each of the `interfaces`, and of a single one",
+):
+    """Delamination threshold of DELA: attributes, without datasets."""
+
+
+class FailureGroup(
+    ResultGroup, group="failure", about="largest exposures over time, found by FAIL", macro="FAIL"
+):
     """Largest exposures over time, found by FAIL."""
 
     x: Annotated[Floats, "numel npp", "x of every point of every element", "length"]
@@ -353,7 +393,12 @@ class FailureGroup(ResultGroup):
     circle: Annotated[CircleExposures, "criteria"]
 
 
-class ExposureRows(Rows):
+class ExposureRows(
+    Rows,
+    group="exposures",
+    about="largest exposures so far outside the load, at every evaluation of FAIL",
+    macro="FAIL",
+):
     """Largest exposure so far of each criterion outside the load, at every evaluation of FAIL."""
 
     exposure: Annotated[Floats, "rows criteria", "largest exposure so far, outside the load"]
@@ -365,7 +410,13 @@ class ExposureRows(Rows):
     y: Annotated[Floats, "rows criteria", "y of its place", "length"]
 
 
-class Reactions(Rows):
+class Reactions(
+    Rows,
+    group="reactions",
+    about="forces of the supports, stored by REAC",
+    macro="REAC",
+    by_pass=True,
+):
     """Forces of the supports, stored by REAC."""
 
     force: Annotated[
@@ -376,33 +427,14 @@ class Reactions(Rows):
     ]
 
 
-class ModeRows(Rows):
+class ModeRows(
+    Rows, group="modes", about="natural modes, found by EIGE", macro="EIGE", by_pass=True
+):
     """Natural modes, found by EIGE."""
 
     number: Annotated[Ints, "rows", "number of the mode, from 1"]
     angular_frequency: Annotated[Floats, "rows", "natural angular frequency", "1/time"]
     shape: Annotated[Floats, "rows numnp ndf", "mode of unit modal mass: every unknown"]
-
-
-# Types of the groups; `threshold` has attributes only.
-GROUP_TYPES: dict[str, type[ResultGroup]] = {
-    "mesh": MeshGroup,
-    "laminate": LaminateStiffness,
-    "tape3": Tape3,
-    "tape8": Tape8,
-    "tape9": Tape9,
-    "history": HistoryRows,
-    "energy": Energy,
-    "gages": GageGroup,
-    "membrane": MembraneRows,
-    "stresses": Stresses,
-    "patch": PatchGroup,
-    "plies": PlyRows,
-    "failure": FailureGroup,
-    "exposures": ExposureRows,
-    "reactions": Reactions,
-    "modes": ModeRows,
-}
 
 
 CURE_STRESS = "plies/cure_stress"  # residual stresses of CURE, of the entire plate
@@ -427,7 +459,18 @@ def _datasets(group: str, kind: type[ResultGroup], sizes_of_all: str = "") -> It
                 yield Dataset(path, shape, description, dimension, kind_of, outer)
 
 
-DATASETS = {d.path: d for name, kind in GROUP_TYPES.items() for d in _datasets(name, kind)}
+DATASETS = {d.path: d for name, info in GROUPS.items() for d in _datasets(name, info.kind)}
+
+
+def values_per_row(group: str, sizes: Mapping[str, int]) -> int:
+    """Return the number of values in a row of a group, without its columns of single numbers."""
+    axes = {**sizes, **FIXED}
+    return sum(
+        math.prod(axes[size] if isinstance(size, str) else size for size in dataset.shape[1:])
+        for dataset in DATASETS.values()
+        if dataset.group == group and dataset.shape[0] == "rows" and len(dataset.shape) > 1
+    )
+
 
 # Datasets of numbered laminates, and of users' criteria of the plies.
 _NAMED_DATASETS = {

@@ -20,7 +20,7 @@ from fecm.mechanics.strains import STRAINS, midplane_height
 from fecm.problem.build import ImpactModel
 from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA
 from fecm.results.exposures import COARSENESS, LOAD_FACTOR
-from fecm.results.groups import STORED_BY
+from fecm.results.groups import GROUPS
 from fecm.results.metrics import INITIAL_PLATE
 from fecm.results.schema import (
     CONTACT,
@@ -257,7 +257,7 @@ Times = Sequence[float]
 MEMBRANE = "membrane"
 LAMINATE = "laminate"
 MATERIAL = "plies/material"
-AT_MACROS = ("tape3", "tape8", "stresses", "plies", "exposures", "reactions", "modes")
+BY_PASS = {name: info.macro for name, info in GROUPS.items() if info.by_pass}
 
 
 def _absent(model: ImpactModel) -> set[str]:
@@ -341,7 +341,7 @@ class Recorder:
             sink.axis_names["criteria"] = (*ALL_CRITERIA, *own_criteria)
         has_impact = model.impact is not None
         self._room = {  # upper bound of the rows of each group
-            **{group: sizes.passes[STORED_BY[group]] for group in AT_MACROS},
+            **{group: sizes.passes[macro] for group, macro in BY_PASS.items()},
             "exposures": sizes.passes["FAIL"] + model.is_stressed_at_rest,
             "tape8": has_impact * sizes.contact_rows,
             "tape9": has_impact * model.variant.program.contact_rows(sizes),
@@ -369,7 +369,7 @@ class Recorder:
             for dataset in _of_laminates(kind, model)
         ]
         self._buffers: dict[str, RowBuffer] = {}
-        for group in (*EVERY_STEP, "tape9", *AT_MACROS, MEMBRANE):
+        for group in (*EVERY_STEP, "tape8", "tape9", "exposures", *BY_PASS, MEMBRANE):
             members = [p for p in self._datasets if p[0].group == group and p[0].shape[0] == "rows"]
             if members:
                 self._buffers[group] = RowBuffer(sink, members)
