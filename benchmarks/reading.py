@@ -25,8 +25,7 @@ from run import distorted, refined
 from fecm.deck import Deck
 from fecm.deck.reader import Reader
 from fecm.problem.build import RunOptions, build_model
-from fecm.problem.loading import load_deck
-from fecm.sweeps.job import checked_problem
+from fecm.problem.loading import load_deck, sole_problem
 
 
 def in_columns(text: str) -> str:
@@ -82,7 +81,7 @@ def main() -> None:
                 lambda text=text: Reader(text).problems(),
                 lambda text=text: model(text),
                 deck.to_text,
-                lambda deck=deck: checked_problem(deck),
+                lambda deck=deck: sole_problem(deck),
             )
             figures = "".join(f"{cost(work, options.rounds):9.3f}" for work in works)
             print(f"{deck.control.numel:10d}  {form:8}{figures}", flush=True)

@@ -15,9 +15,9 @@ import fecm
 from fecm.deck import model
 from fecm.location import Sampling, moving_plate, responses, rows_of, shared_symmetry
 from fecm.mechanics import PlateMotion, gages, patch_weights
-from fecm.problem import build_plate
+from fecm.problem import build_plate, sole_problem
 from fecm.problem.generate import generate
-from fecm.sweeps import checked_problem, plate_response
+from fecm.sweeps import plate_response
 from tests.panels import (
     OFF_AXIS,
     PUBLIC,
@@ -92,7 +92,7 @@ def curved(deck: fecm.Deck) -> fecm.Deck:
 def test_the_run_of_a_gage_gives_the_strains_of_an_impulse(
     layup: str, shape: Callable[[fecm.Deck], fecm.Deck]
 ) -> None:
-    problem = checked_problem(shape(panel(layup)))
+    problem = sole_problem(shape(panel(layup)))
     motion = PlateMotion(moving_plate(problem.plate))
     records = problem.deck.require(model.Gages).records
     read = gages(problem.mesh, records, curvature=problem.plate.curvature)
@@ -252,7 +252,7 @@ def test_the_errors_of_several_seeds_are_those_of_the_covariance() -> None:
 
 def strains_per_place_and_force(deck: fecm.Deck, found: fecm.Location) -> Floats:
     """Change of the fitted strains with x, y and the forces that are not held at 0, by runs."""
-    problem, step, dt = checked_problem(deck), 0.3, 2e-7
+    problem, step, dt = sole_problem(deck), 0.3, 2e-7
     mesh, motion = problem.mesh, PlateMotion(moving_plate(problem.plate))
     read = gages(mesh, deck.require(model.Gages).records)
     sums = motion.dof_sums(read.dof_indices, read.weights)

@@ -15,10 +15,10 @@ import fecm
 from fecm.authoring import apply_case
 from fecm.deck import Boundary, Finding, Nonlinear, Preload, Shear
 from fecm.mechanics import critical_time_step
-from fecm.problem import build_plate, load_deck
+from fecm.problem import build_plate, load_deck, sole_problem
 from fecm.problem.generate import generate
 from fecm.studies import StudyError
-from fecm.sweeps import checked_problem, shares_plate
+from fecm.sweeps import shares_plate
 from tests.builders import DATA
 from tests.calls import assert_unusable, call
 from tests.decks import ROOT
@@ -318,5 +318,5 @@ def test_a_support_of_a_nonlinear_plate_leaves_it_free_inside() -> None:
 
 def test_nonlinear_plates_share_no_impulse_response() -> None:
     linear = fecm.impact(plate(), PLIES, MASS, LAW, kinematics="linear", **QUICK)
-    assert shares_plate(checked_problem(linear))
-    assert not shares_plate(checked_problem(deck()))
+    assert shares_plate(sole_problem(linear))
+    assert not shares_plate(sole_problem(deck()))

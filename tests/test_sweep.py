@@ -24,7 +24,7 @@ from fecm import ContactPoint, SweepResult
 from fecm.authoring import Case, CasesError, apply_case, grid_cases, parse_vary, read_cases
 from fecm.deck import Deck
 from fecm.mechanics import AppliedForce, HystereticLaw, LinearPermanent, stack_parameters
-from fecm.problem import build_law, build_model, build_projectile, load_deck
+from fecm.problem import build_law, build_model, build_projectile, load_deck, sole_problem
 from fecm.sweeps import (
     LOST,
     Convolution,
@@ -34,7 +34,6 @@ from fecm.sweeps import (
     PartialResults,
     Task,
     carry_out_plan,
-    checked_problem,
     execute,
     on_workers,
     plate_response,
@@ -240,7 +239,7 @@ def test_a_layup_keeps_the_plys_thickness_and_a_thickness_scales_all() -> None:
 def test_a_plate_with_other_loads_is_run_whole() -> None:
     load = "FORC\n    8    0       0.0       0.0       1.0\n\n"
     deck = model(small(STEPS, data=load + DATA_CARDS))
-    problem = checked_problem(deck)
+    problem = sole_problem(deck)
     assert not shares_plate(problem)
     found = fecm.sweep(deck, {"velocity": [50.0, 100.0]}, history=True)
     assert found.force is not None
@@ -336,7 +335,7 @@ def children() -> list[int]:
 @pytest.mark.long
 @pytest.mark.linux
 def test_a_worker_that_dies_costs_time_only() -> None:
-    problem = checked_problem(model(small(STEPS)))
+    problem = sole_problem(model(small(STEPS)))
     made = plan(problem, grid_cases([("layup", list(LAYUPS))]), history=True)
     killed: list[int] = []
 
@@ -357,7 +356,7 @@ def die(task: Task) -> Outcome:
 
 @pytest.mark.long
 def test_tasks_whose_workers_always_die_end_as_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = checked_problem(model(small()))
+    problem = sole_problem(model(small()))
     made = plan(problem, grid_cases([("layup", ["[0]", "[90]"])]))
     monkeypatch.setattr(execute, "attempt", die)
     monkeypatch.setattr(execute, "DEATHS", 1)
@@ -407,7 +406,7 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
     cluster: tuple[str, list[subprocess.Popen[bytes]]],
 ) -> None:
     address, workers = cluster
-    problem = checked_problem(model(small(STEPS)))
+    problem = sole_problem(model(small(STEPS)))
     made = plan(problem, grid_cases([("layup", list(LAYUPS))]), history=True)
     finished: list[int] = []
 
@@ -445,7 +444,7 @@ class Notes(fecm.Watch):
 
 def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     deck, layups = model(small()), LAYUPS[:8]
-    problem = checked_problem(deck)
+    problem = sole_problem(deck)
     made = plan(problem, grid_cases([("layup", list(layups))]), history=True)
     path = tmp_path / "sweep.h5"
     begun: list[int] = []

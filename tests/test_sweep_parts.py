@@ -19,6 +19,7 @@ import pytest
 
 from fecm._files import OutputError
 from fecm.authoring import grid_cases, with_time_step
+from fecm.problem import sole_problem
 from fecm.sweeps import (
     LOST,
     DamagedPartError,
@@ -28,7 +29,6 @@ from fecm.sweeps import (
     Plan,
     Task,
     carry_out_plan,
-    checked_problem,
     exclusive_result,
     execute,
     run_task,
@@ -44,13 +44,13 @@ from tests.kill_runs import SWEEP, SWEPT
 def made() -> Plan:
     """Two plates."""
     return plan(
-        checked_problem(model(small())), grid_cases([("layup", ["[0/90]", "[90/0]"])]), history=True
+        sole_problem(model(small())), grid_cases([("layup", ["[0/90]", "[90/0]"])]), history=True
     )
 
 
 def test_a_part_with_any_byte_changed_or_cut_off_is_damaged(made: Plan, tmp_path: Path) -> None:
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
-    task = tasks(checked_problem(made.settings.deck), made)[0]
+    task = tasks(sole_problem(made.settings.deck), made)[0]
     parts.put(task, run_task(task))
     (path,) = parts.folder.glob("task-*.npz")
     data = path.read_bytes()
@@ -75,7 +75,7 @@ def test_cases_lost_with_their_workers_are_not_stored_as_finished(
 
     monkeypatch.setattr(execute, "attempt", attempt)
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
-    problem = checked_problem(made.settings.deck)
+    problem = sole_problem(made.settings.deck)
     found = carry_out_plan(problem, made, parts=parts)
     assert found.completed.tolist() == [False, True]
     assert [parts.get(task) is None for task in tasks(problem, made)] == [True, False]
@@ -97,7 +97,7 @@ def test_a_sweep_that_was_killed_before_its_first_plate_was_done_begins_again(
 
 def test_an_outcome_without_the_mark_of_its_sweep_is_not_taken(made: Plan, tmp_path: Path) -> None:
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
-    (task, *_) = tasks(checked_problem(made.settings.deck), made)
+    (task, *_) = tasks(sole_problem(made.settings.deck), made)
     parts.put(task, run_task(task))
     (parts.folder / "sweep.json").unlink()
     with pytest.raises(OtherSweepError, match="another sweep"):
@@ -147,7 +147,7 @@ FORGERIES: dict[str, Callable[[dict[str, Any]], object]] = {
 def stored(tmp_path: Path) -> tuple[Path, Path, bytes]:
     """A sweep of two plates whose first one is finished: its folder, part and right result."""
     (tmp_path / "s.inp").write_text(small())
-    problem = checked_problem(tmp_path / "s.inp")
+    problem = sole_problem(tmp_path / "s.inp")
     made = plan(problem, grid_cases([("layup", ["[0/90]", "[90/0]"])]), history=True)
     assert call(*SWEEP_OF_TWO, "right.h5", cwd=tmp_path).exit_code == 0
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
@@ -205,7 +205,7 @@ def test_a_part_of_another_sweep_with_the_same_case_numbers_is_run_again(
 ) -> None:
     folder, part, _ = stored
     (folder / "other.inp").write_text(small(data=DATA_CARDS.replace("115.0", " 90.0")))
-    problem = checked_problem(folder / "other.inp")
+    problem = sole_problem(folder / "other.inp")
     made = plan(problem, grid_cases([("layup", ["[0/90]", "[90/0]"])]), history=True)
     others = PartialResults(folder / "other.h5", made.fingerprint())
     task = tasks(problem, made)[0]

@@ -36,7 +36,7 @@ from fecm.deck.units import unit_names, unit_of
 from fecm.listing.slips import REPORT, active_slips
 from fecm.problem.build import RunOptions
 from fecm.problem.deck_check import check_loaded
-from fecm.problem.loading import LoadedDeck, load_deck
+from fecm.problem.loading import LoadedDeck, load_deck, sole
 from fecm.problem.problem import Problem
 
 
@@ -81,12 +81,9 @@ def refusing_errors(otherwise: str = "") -> Iterator[None]:
         raise RefusedError(count_findings(errors) + otherwise) from None
 
 
-def load_single(deck: Path, command: str) -> Problem:
-    """Return the only problem of a deck; raises as :func:`load_valid`."""
-    problems = load_valid(deck)
-    if len(problems) != 1:
-        raise RefusedError(f"{deck} has {len(problems)} problems; {command} takes one")
-    return problems[0]
+def load_single(deck: Path) -> Problem:
+    """Return the only problem of a deck; raises as :func:`load_valid`, or OptionsError."""
+    return sole(load_valid(deck), deck)
 
 
 DECK_OR_DASH = click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path)

@@ -29,7 +29,7 @@ def estimate_command(deck: Path, form: Format) -> None:
     velocity and energy are the values at which the peak force reaches the delamination threshold.
     The models without a mesh neglect DAMP, and the infinite plate neglects PREL.
     """
-    estimate = estimate_problem(load_single(deck, "estimate"))
+    estimate = estimate_problem(load_single(deck))
     note(*estimate.notes)
     if form is Format.JSON:
         echo_json(estimate.to_dict())

@@ -95,7 +95,7 @@ def identify_command(
     targets = OutputPaths(output or DASH, picture, overwrite, deck, measured)
     if page is not None:
         check_page(page, overwrite, [deck, measured])
-    problem = load_single(deck, "identify")
+    problem = load_single(deck)
     job = IdentificationJob(
         problem.deck, measured, free, **options, columns=columns or (), units=units or ()
     )

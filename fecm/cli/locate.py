@@ -76,7 +76,7 @@ def locate_command(
     well, or the model does not describe them.
     """
     targets = OutputPaths(output or DASH, picture, overwrite, deck, strains)
-    job = LocationJob(load_single(deck, "locate").deck, strains, **options)
+    job = LocationJob(load_single(deck).deck, strains, **options)
     with every_minute(lambda minutes: f"fecm: locating for {minutes} min"):
         location = job.execute()
     targets.draw("location:location_picture", location)

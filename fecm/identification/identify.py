@@ -51,7 +51,7 @@ from fecm.identification.misfit import (
 from fecm.identification.result import CARDS, Identification
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import law_name, own_law
-from fecm.problem.loading import AnyDeck
+from fecm.problem.loading import AnyDeck, sole_problem
 from fecm.problem.memory import needed_bytes
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
@@ -61,7 +61,6 @@ from fecm.simulation.job import Price
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import FILTERS, Filter, filter_of
 from fecm.sweeps.backends import backend_of
-from fecm.sweeps.job import checked_problem
 from fecm.sweeps.outcome import Backend
 from fecm.sweeps.plan import check_law, shares_plate
 
@@ -150,7 +149,7 @@ class IdentificationJob:
     units: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        self.problem: Problem = checked_problem(self.deck)
+        self.problem: Problem = sole_problem(self.deck, warns=False)
         self.measurement: Measurement = measurement_of(
             self.measured, unit_names(self.problem.deck), self.columns, self.units
         )
@@ -285,7 +284,7 @@ def identify(
 @lru_cache(maxsize=4)
 def _shared_backend(deck: Deck) -> Backend:
     """Return the back end that computes impacts from the response of the deck's plate."""
-    problem = checked_problem(deck)
+    problem = sole_problem(deck, warns=False)
     if problem.deck.has(Nonlinear):
         raise StudyError(
             "identify needs a linear plate, and the deck has NONL; fit a test at an energy that "

@@ -36,10 +36,9 @@ from fecm.location.table import StrainSource, StrainTable, strain_table
 from fecm.location.verdict import BETTER, Cause, is_doubtful, judged, likely_cause
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.time_step import critical_time_step
-from fecm.problem.loading import AnyDeck
+from fecm.problem.loading import AnyDeck, sole_problem
 from fecm.problem.problem import Problem
 from fecm.simulation.job import Price
-from fecm.sweeps.job import checked_problem
 
 CERTAIN = 2.0  # fall of the misfit above which no other cause is tried
 PARTS = 4  # of a search: responses, places, force, errors
@@ -99,7 +98,7 @@ class LocationJob(LocationOptions):
 
     def __post_init__(self) -> None:
         self.check()
-        self.problem: Problem = checked_problem(self.deck)
+        self.problem: Problem = sole_problem(self.deck, warns=False)
         deck = self.problem.deck
         if deck.has(Nonlinear):
             raise StudyError(

@@ -44,12 +44,12 @@ from fecm.mechanics.points import RADIUS_PER_THICKNESS, gages
 from fecm.mechanics.symmetry import images
 from fecm.mechanics.time_step import critical_time_step, taken_time_step
 from fecm.problem.generate import generate
+from fecm.problem.loading import sole_problem
 from fecm.problem.parts import build_plate
 from fecm.problem.problem import Problem
 from fecm.problem.refine import refined_deck
 from fecm.problem.symmetry import symmetry_lines
 from fecm.simulation.job import ENOUGH
-from fecm.sweeps.job import checked_problem
 from fecm.sweeps.responses import plate_response
 
 SAME = 1e-9  # relative difference that is rounding, of stiffnesses and rows
@@ -302,7 +302,7 @@ def _responses_in_region(
 ) -> tuple[Indices, NDArray[np.floating]]:
     """Return the nodes of a region and the gages' responses there, cached for other tables."""
     interval, unit, count = samples
-    problem = checked_problem(deck)
+    problem = sole_problem(deck, warns=False)
     if lines := " and ".join(map(str, symmetry_lines(deck, problem.mesh))):
         raise StudyError(
             f"locate needs the whole plate, and the deck has the line of symmetry {lines}: it "

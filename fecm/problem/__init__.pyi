@@ -10,6 +10,7 @@ from fecm.problem.findings_page import all_rules as all_rules
 from fecm.problem.generate import restraint_codes as restraint_codes
 from fecm.problem.loading import LoadedDeck as LoadedDeck
 from fecm.problem.loading import load_deck as load_deck
+from fecm.problem.loading import sole_problem as sole_problem
 from fecm.problem.memory import needed_bytes as needed_bytes
 from fecm.problem.outline import unsupported as unsupported
 from fecm.problem.parts import build_law as build_law

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from fecm._errors import OptionsError, warn
 from fecm._typing import AnyFile
@@ -16,6 +16,8 @@ from fecm.problem.check import check_listing, check_problem
 from fecm.problem.problem import Problem
 from fecm.problem.rules.quadrature import HOURGLASS
 from fecm.problem.rules.time_step import UNSTABLE
+
+_Problem = TypeVar("_Problem")
 
 
 class LoadedDeck(NamedTuple):
@@ -86,8 +88,7 @@ def load_one(deck: AnyDeck, mode: str = REPORT) -> Problem:
     """
     loaded = load_deck(deck, mode)
     loaded.refuse_errors()
-    check_single(loaded.problems)
-    return loaded.problems[0]
+    return sole(loaded.problems)
 
 
 def sole_problem(deck: AnyDeck, *, warns: bool = True) -> Problem:
@@ -98,10 +99,10 @@ def sole_problem(deck: AnyDeck, *, warns: bool = True) -> Problem:
     """
     loaded = load_deck(deck)
     loaded.refuse_errors(force=True)
-    check_single(loaded.problems)
+    problem = sole(loaded.problems)
     for text in loaded.warnings if warns else ():
         warn(text)
-    return loaded.problems[0]
+    return problem
 
 
 def read_one(path_or_text: str | Path | AnyFile) -> Deck:
@@ -115,12 +116,14 @@ def read_one(path_or_text: str | Path | AnyFile) -> Deck:
         If it has several problems, or none.
     """
     read = read_deck(path_or_text)
-    decks = [read] if isinstance(read, Deck) else read
-    check_single(decks)
-    return decks[0]
+    return sole([read] if isinstance(read, Deck) else read)
 
 
-def check_single(problems: Sequence[object]) -> None:
-    """Raise OptionsError unless there is exactly one problem."""
+def sole(problems: Sequence[_Problem], deck: str | Path = "the deck") -> _Problem:
+    """Return the only problem of a deck, which messages name.
+
+    Raises OptionsError unless there is exactly one problem.
+    """
     if len(problems) != 1:
-        raise OptionsError(f"the deck has {len(problems)} problems, not one")
+        raise OptionsError(f"{deck} has {len(problems)} problems, not one")
+    return problems[0]

@@ -38,7 +38,7 @@ from fecm.mechanics.projectile import (
 )
 from fecm.mechanics.stiffness_product import AUTO, SOLVERS
 from fecm.problem.build import ENERGY_LIMIT, RunOptions, check_run_options
-from fecm.problem.loading import AnyDeck, check_single, load_deck
+from fecm.problem.loading import AnyDeck, load_deck, sole
 from fecm.problem.memory import check_run_memory, needed_bytes
 from fecm.problem.problem import Problem
 from fecm.results.result import Result, load
@@ -597,7 +597,7 @@ def run_one(job: Run) -> Result:
     >>> print(f"{result.force.max():.2f} lb")
     86.20 lb
     """
-    check_single(job.problems)
+    sole(job.problems)
     result = job.execute()
     assert isinstance(result, Result)
     return result

@@ -15,7 +15,6 @@ from fecm.sweeps.execute import on_workers as on_workers
 from fecm.sweeps.files import save_sweep as save_sweep
 from fecm.sweeps.in_full import without_output as without_output
 from fecm.sweeps.job import Sweep as Sweep
-from fecm.sweeps.job import checked_problem as checked_problem
 from fecm.sweeps.outcome import Outcome as Outcome
 from fecm.sweeps.outcome import Status as Status
 from fecm.sweeps.partial_results import DamagedPartError as DamagedPartError

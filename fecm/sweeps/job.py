@@ -32,7 +32,7 @@ from fecm.deck.catalogue import system_of
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import own_law
 from fecm.problem.build import RunOptions
-from fecm.problem.loading import AnyDeck, LoadedDeck, load_deck
+from fecm.problem.loading import AnyDeck, LoadedDeck, load_deck, sole
 from fecm.problem.problem import Problem
 from fecm.simulation.job import Price, ProblemRun
 from fecm.sweeps.backends import case_deck
@@ -572,19 +572,10 @@ class Sweep:
         return html_table(Table(tuple(rows), title=repr(self)[1:-1]))
 
 
-def checked_problem(deck: AnyDeck) -> Problem:
-    """Return the checked problem of a deck.
-
-    Raises DeckError if the deck has errors, CasesError if it has several problems.
-    """
-    return _loaded(deck).problems[0]
-
-
 def _loaded(deck: AnyDeck) -> LoadedDeck:
     loaded = load_deck(deck)
     loaded.refuse_errors(force=True)
-    if (count := len(loaded.problems)) != 1:
-        raise CasesError(f"{loaded.source} has {count} problems; a sweep takes one")
+    sole(loaded.problems, loaded.source)
     return loaded
 
 

@@ -17,13 +17,12 @@ from fecm.mechanics.quick_models import inelasticity, infinite_plate, static_pea
 from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
-from fecm.problem.loading import load_deck
+from fecm.problem.loading import load_deck, sole_problem
 from fecm.problem.parts import build_plate
 from fecm.results.end import Deflection, LastContact, decided, ends, peak_known
 from fecm.results.result import Result
 from fecm.results.run_metrics import start_w_of
 from fecm.sweeps.execute import carry_out_plan
-from fecm.sweeps.job import checked_problem
 from fecm.sweeps.plan import plan
 from fecm.verification.case import Value, case
 from fecm.verification.parts import ALPHA_CR
@@ -162,7 +161,7 @@ def _listing_impact() -> Sequence[Value]:
 @case
 def _convolution() -> Sequence[Value]:
     deck = decks.report_impact(1000)
-    problem = checked_problem(deck)
+    problem = sole_problem(deck, warns=False)
     swept = carry_out_plan(problem, plan(problem, [{"velocity": 60.0}], history=True)).force
     if swept is None:
         raise ValueError("the sweep has kept no forces")
