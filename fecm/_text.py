@@ -70,6 +70,8 @@ DECK_DIGITS = 6  # of values that the deck gives
 
 def printable(text: str) -> str:
     """Escape control characters and lone surrogates, giving one line for any terminal."""
+    if text.isprintable():
+        return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 

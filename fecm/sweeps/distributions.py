@@ -288,14 +288,3 @@ def _of_logarithm(law: ValueDistribution) -> str:
     sigma_of_logarithm = math.sqrt(math.log(0.5 + 0.5 * math.hypot(1.0, 2.0 * sigma / median)))
     text = f"SIGMA of {law} is the standard deviation of the logarithm"
     return f"{text}; a standard deviation of {sigma:g} is SIGMA {sigma_of_logarithm:.2g}"
-
-
-def parse_random(text: str) -> tuple[str, ValueDistribution]:
-    """Parse ``NAME=LAW:PARAMETERS``.
-
-    Raises CasesError if the text has another form, or is invalid.
-    """
-    name, equals, law = (part.strip() for part in text.partition("="))
-    if not equals:
-        raise CasesError(f"`{text}`: write NAME=LAW, such as k=lognormal:1.9e6,0.15")
-    return name, parse_law(name, law)
