@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import fecm
 from fecm.authoring import CasesError
+from fecm.deck import quantity
 from fecm.results import EXPOSURES, band_of_largest, largest_exposures
 from fecm.sweeps import LEVEL_EXCESS, velocity_at_level
 from tests.calls import assert_unusable, call
@@ -17,6 +19,22 @@ from tests.test_first_failure import failing, run
 
 # The projectile has left the plate.
 DECK = failing(every=4, steps=400)
+
+
+def resolved() -> fecm.Deck:
+    """A plate whose mesh bounds the exposures, unlike the four elements of DECK."""
+    return fecm.impact(
+        fecm.Plate.rectangle((40, 40), (8, 8), support="simple"),
+        fecm.Laminate("[0/90]2s", "IM7/8552", 0.25),
+        fecm.RigidMass(1e-5),
+        fecm.Contact.estimate(radius=6),
+        velocity=3000,
+        duration=4e-4,
+        units="mm-N-s",
+        damage=True,
+        plies=False,
+        kinematics="linear",
+    )
 
 
 @pytest.mark.parametrize(("factor", "power"), [(0.5, 1.2), (3.0, 0.9), (0.1, 1.0)])
@@ -70,7 +88,8 @@ def test_a_run_at_the_found_velocity_has_this_exposure(tmp_path: Path) -> None:
     (velocity,) = found["found_velocity"]
     assert f"smallest found    {velocity:.4g}, " in done.stdout
     low, high = (found[name][0] for name in ("found_energy_low", "found_energy_high"))
-    assert f"; finer meshes {low:.3g} to {high:.3g}" in done.stdout
+    assert (low, high) == (0.0, np.inf)  # four elements
+    assert "; finer meshes not bounded" in done.stdout
     result = run(DECK.replace("     115.0", f"{velocity:10.6f}"))
     largest = result["exposures/exposure"][-1]
     assert largest.max() == pytest.approx(1.0, rel=2e-5)
@@ -84,34 +103,44 @@ def test_a_run_at_the_found_velocity_has_this_exposure(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_at_the_ends_of_the_energies_the_band_of_the_exposure_ends_at_the_level() -> None:
-    found = fecm.sweep(DECK, until={"exposure": 1.0})
+    deck = resolved()
+    found = fecm.sweep(deck, until={"exposure": 1.0})
     low, energy, high = (
         found[name][0] for name in ("found_energy_low", "found_energy", "found_energy_high")
     )
     assert low < energy < high
     for end, of_band in ((low, 1), (high, 0)):
         velocity = found["found_velocity"][0] * np.sqrt(end / energy)
-        result = run(DECK.replace("     115.0", f"{velocity:10.6f}"))
+        result = fecm.run_one(deck.with_(velocity=velocity))
         assert band_of_largest(largest_exposures(result))[of_band] == pytest.approx(1.0, rel=0.01)
-    exposures = fecm.sweep(DECK, {"velocity": [115.0]}, measure=["failure"])
-    band = band_of_largest(largest_exposures(run(DECK)))
+    exposures = fecm.sweep(deck, {"velocity": [3000.0]}, measure=["failure"])
+    band = band_of_largest(largest_exposures(fecm.run_one(deck)))
     assert (exposures["exposure_low"][0], exposures["exposure_high"][0]) == pytest.approx(band)
 
 
-@pytest.mark.parametrize(("radius", "noted"), [("0.2", False), ("0.02", True)])
-@pytest.mark.few(1)  # of 2, 0.7 s each
+@pytest.mark.parametrize(
+    ("deck", "noted"),
+    [
+        pytest.param(lambda: DECK, True, id="four elements"),
+        pytest.param(lambda: resolved().to_text(), False, id="resolved", marks=pytest.mark.long),
+    ],
+)
 def test_a_note_says_where_the_mesh_decides_the_energy(
-    radius: str, noted: bool, tmp_path: Path
+    deck: Callable[[], str], noted: bool, tmp_path: Path
 ) -> None:
-    patch = "DISC             .2"
-    assert patch in DECK
-    (tmp_path / "d.inp").write_text(DECK.replace(patch, f"DISC{radius:>15}"))
+    (tmp_path / "d.inp").write_text(deck())
     options = ("--find", "velocity", "--until", "exposure=1", "-o", "s.h5")
     done = call("sweep", "d.inp", *options, cwd=tmp_path)
     assert ("the mesh decides the energy in 1 of 1 cases" in done.stderr) is noted
     sweep = fecm.load_sweep(tmp_path / "s.h5")
-    share = sweep["found_energy_low"][0] / sweep["found_energy"][0]
-    assert (share < 0.75) == noted
+    low, energy, high = (
+        sweep[name][0] for name in ("found_energy_low", "found_energy", "found_energy_high")
+    )
+    assert (low < 0.75 * energy) == noted
+    assert ("; finer meshes not bounded" in done.stdout) is noted
+    unit = sweep.unit("found_energy")
+    text = f"; finer meshes {quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
+    assert (text in done.stdout) is not noted
 
 
 @pytest.mark.long

@@ -196,7 +196,6 @@ class Around(NamedTuple):
     # stresses fall as 1 / r, so that they are larger on the circle than at the element's centre by
     # r / R.
     factor: Floats
-    coarseness: float  # longest side of the elements on the circle over R
 
 
 class FailureMonitor:

@@ -30,6 +30,7 @@ from fecm.mechanics.projectile import STEPS, Projectile, RodMethod, Transducer
 from fecm.mechanics.stiffness_product import AUTO, CSR, KERNELS, SOLVERS, Workers
 from fecm.mechanics.strains import StrainField
 from fecm.mechanics.symmetry import restrain_resting_dofs, symmetry_reduction
+from fecm.problem.estimates import load_mesh
 from fecm.problem.generate import generate
 from fecm.problem.parts import (
     build_law,
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     from fecm.mechanics.failure_monitor import FailureMonitor
     from fecm.mechanics.ply_stresses import Residual
     from fecm.mechanics.stretching import Stretching
+    from fecm.results.exposure_bands import LoadMesh
 
 ENERGY_LIMIT = 0.1  # relative error of the energy balance that ends a run
 WORTH_SHARING = 100_000  # number of equations above which threads save more than they cost
@@ -120,6 +122,7 @@ class ImpactModel(NamedTuple):
     patch: ContactPatch | None
     plies: PlyStresses | None  # elements whose ply stresses are stored; None without PLYS
     failure: FailureMonitor | None  # failure criteria; None without FAIL
+    load_mesh: LoadMesh | None  # elements on the circle of the failure criteria, if there is one
     stress_places: PlyPoints | None  # points of these stresses; None without PLYS and FAIL
     # (numel, points): where plate theory does not hold; None without PLYS and FAIL.
     under_load: Bools | None
@@ -162,6 +165,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         places = PlyPoints(*stress_points.places(mesh.coordinates))
         under_load = problem.under_load(places.x, places.y)
     plies, failure = _stresses(problem, plate, motion, cure, chosen.criteria, under_load)
+    around = None if failure is None else failure.around
     read, station = (
         _gages(problem, mesh, plate),
         build_station(deck, rod, variant.impact, is_own=chosen.projectile is not None),
@@ -185,6 +189,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         patch=problem.patch,
         plies=plies,
         failure=failure,
+        load_mesh=None if around is None else load_mesh(problem, around.circle.elements),
         stress_places=places,
         under_load=under_load,
         cure=cure,
@@ -311,7 +316,6 @@ def _stresses(
                 circle,
                 problem.load_place,
                 problem.factors_to_circle,
-                problem.coarseness(circle.elements),
             )
         far = ~problem.under_load_by_centre
         failure = kind(made(None), strengths, user_criteria, counts, far, around)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._errors import FecmError
+from fecm._typing import Indices
 from fecm.deck import model
 from fecm.deck.model import Impact
 from fecm.mechanics.mesh import longest_sides
@@ -27,10 +28,14 @@ from fecm.mechanics.solutions import ConvergenceError, SingularStiffnessError, s
 from fecm.problem.contact_estimates import wave_impedance
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
+from fecm.results.exposure_bands import LoadMesh
 
 # Elements per bending wave of the contact's duration that are enough for a peak.
 ENOUGH_PER_WAVE = 8
 MOST_ERROR = 0.5  # largest mesh error of the peak that is estimated
+NINE_NODES = 9
+CORNERS = 4  # of an element of nine nodes, its first ones
+SAME_PLACE = 0.01  # distance from a corner over the side up to which a load is at the corner
 FULL = 3  # shear order at which 9-node elements have no zero-energy modes
 
 
@@ -77,6 +82,37 @@ def resolution(problem: Problem) -> Resolution | None:
     fitted = quadratic and problem.patch is None and not problem.plate.rules.assumes_shear
     error = estimated_mesh_error(wave / side, side / laminate.thickness, shear) if fitted else None
     return Resolution(float(contact), float(wave), side, error)
+
+
+def load_mesh(problem: Problem, elements: Indices) -> LoadMesh:
+    """Describe the elements on the circle around the load, which decide the error of exposures.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem with a load.
+    elements : ndarray of int
+        Rows of the elements on the circle.
+    """
+    mesh, laminate, place = problem.mesh, problem.laminate, problem.load_place
+    nodes = mesh.elements[elements]
+    corners = mesh.coordinates[nodes[:, :CORNERS] - 1]
+    apart = np.linalg.norm(corners - np.array(place), axis=-1).min(initial=math.inf)
+    coarseness = problem.coarseness(elements)
+    lengths = [problem.span.length]
+    if problem.has_impact and (waves := resolution(problem)) is not None:
+        lengths.append(waves.wave / 2.0)
+    curvature = float(np.abs(problem.plate.curvature).max())
+    if curvature:
+        lengths.append(math.sqrt(laminate.thickness / curvature))
+    rigidities = laminate.D[0, 0], laminate.D[1, 1]
+    return LoadMesh(
+        coarseness=coarseness,
+        at_corner=bool(apart <= SAME_PLACE * coarseness * problem.reach_of_load),
+        nine_nodes=nodes.shape[1] == NINE_NODES and bool((nodes > 0).all()),
+        bending_reach=min(lengths) / problem.reach_of_load,
+        anisotropy=float((max(rigidities) / min(rigidities)) ** 0.25),
+    )
 
 
 def estimated_mesh_error(elements: float, slenderness: float, shear: int) -> float:

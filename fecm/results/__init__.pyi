@@ -12,6 +12,9 @@ from fecm.results.end import ends as ends
 from fecm.results.end import settled_deflection as settled_deflection
 from fecm.results.export import dataset_csv_lines as dataset_csv_lines
 from fecm.results.export import write_vtkhdf as write_vtkhdf
+from fecm.results.exposure_bands import LoadMesh as LoadMesh
+from fecm.results.exposure_bands import is_bounded as is_bounded
+from fecm.results.exposure_bands import mesh_band as mesh_band
 from fecm.results.exposures import FailureVerdict as FailureVerdict
 from fecm.results.exposures import LargestExposure as LargestExposure
 from fecm.results.exposures import band_of_largest as band_of_largest
@@ -19,7 +22,6 @@ from fecm.results.exposures import evaluations_in_contact as evaluations_in_cont
 from fecm.results.exposures import failure_verdict as failure_verdict
 from fecm.results.exposures import first_failures as first_failures
 from fecm.results.exposures import largest_exposures as largest_exposures
-from fecm.results.exposures import mesh_band as mesh_band
 from fecm.results.groups import GROUPS as GROUPS
 from fecm.results.groups import ExportError as ExportError
 from fecm.results.groups import NotStoredError as NotStoredError

@@ -21,19 +21,12 @@ from fecm.results.criteria import (
     plies_in_words,
     where,
 )
+from fecm.results.exposure_bands import LoadMesh, mesh_band
 from fecm.results.stored import Stored
 
 LOWER_BOUNDS = "the run ends in contact: exposures are lower bounds"
 TIE = 1e-9  # relative difference of equal exposures; see fecm/mechanics/exposures.py
 FEWEST = 20  # evaluations of FAIL during contact below which maxima may be missed
-# Longest side of the elements on the circle around the load, over the radius R of the circle.
-COARSENESS = "coarseness"  # attribute of the group circle
-RESOLVED = 2.6  # coarseness up to which the measured errors of the largest exposures lie in a band
-# Share by which largest exposures are below the finest mesh's, by coarseness, measured on four
-# plates with up to eight meshes; beyond the last coarseness it is not known.
-COARSE = (RESOLVED, 3.8, 7.5, 15.0)
-TOO_LOW = {"plies": (0.015, 0.08, 0.25, 0.44), INTERLAMINAR: (0.12, 0.23, 0.37, 0.55)}
-TOO_HIGH = {"plies": 0.04, INTERLAMINAR: 0.12}
 # Attributes of a criterion's group, with CURE.
 AT_REST = "at_rest"
 LOAD_FACTOR = "load_factor"
@@ -50,7 +43,8 @@ class LargestExposure(NamedTuple):
     y: float
     time: float
     mirrors: int = 0  # other points that have the same exposure
-    # Lowest and highest exposure that finer meshes may give; None where it is not known.
+    # Lowest and highest exposure that finer meshes may give, (0, inf) where the mesh does not
+    # bound it; None without a load.
     band: tuple[float, float] | None = None
     # With CURE; None without it.
     at_rest: float | None = None  # largest exposure of the residual stresses alone
@@ -94,35 +88,10 @@ def failure_verdict(largest: Sequence[LargestExposure]) -> FailureVerdict:
     )
 
 
-def mesh_band(exposure: float, criterion: str, coarseness: float) -> tuple[float, float]:
-    """Return the lowest and the highest exposure that finer meshes may give.
-
-    Parameters
-    ----------
-    exposure : float
-        Largest exposure of this mesh.
-    criterion : str
-        Its criterion.
-    coarseness : float
-        Longest side of the elements at the load over c + h/2.
-
-    Examples
-    --------
-    >>> [round(value, 3) for value in mesh_band(1.0, "puck", 2.0)]
-    [0.962, 1.015]
-    >>> [round(value, 3) for value in mesh_band(1.0, "puck", 7.5)]
-    [0.962, 1.333]
-    """
-    kind = INTERLAMINAR if criterion == INTERLAMINAR else "plies"
-    low = float(np.interp(coarseness, COARSE, TOO_LOW[kind], right=1.0))
-    highest = exposure / (1.0 - low) if low < 1.0 else math.inf
-    return exposure / (1.0 + TOO_HIGH[kind]), highest
-
-
 def band_of_largest(largest: Sequence[LargestExposure]) -> tuple[float, float]:
     """Return the lowest and the highest value that finer meshes may give the largest exposure.
 
-    Both are NaN where they are not known.
+    They are 0 and infinite where the mesh does not bound it. Both are NaN where they are not known.
     """
     bands = [exposure.band for exposure in largest if exposure.band is not None]
     if not bands or len(bands) < len(largest):
@@ -204,10 +173,8 @@ def _largest(
     if not 0 <= code < len(modes):
         raise ResultFileError(f"failure/{criterion}/mode has the mode {code}, which has no name")
     about = stored.attributes_of(f"failure/{criterion}")
-    coarseness = stored.attributes_of("failure/circle").get(COARSENESS)
-    band = None
-    if isinstance(coarseness, float):
-        band = mesh_band(exposure, criterion, coarseness)
+    mesh = LoadMesh.of_attributes(stored.attributes_of("failure/circle"))
+    band = None if mesh is None else mesh_band(exposure, criterion, mesh)
     mode, materials = of_material(stored, criterion, ply, (x, y), modes[code])
     return LargestExposure(
         criterion,

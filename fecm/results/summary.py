@@ -16,6 +16,7 @@ from fecm.deck.units import quantity as shown_quantity
 from fecm.deck.units import unit_of
 from fecm.results.criteria import spelt
 from fecm.results.end import End
+from fecm.results.exposure_bands import is_bounded
 from fecm.results.exposures import (
     FailureJson,
     FailureVerdict,
@@ -378,6 +379,8 @@ def _band(largest: LargestExposure) -> str:
     """Format the exposures that finer meshes may give."""
     if largest.band is None:
         return ""
+    if not is_bounded(largest.band):
+        return "; finer meshes not bounded"
     low, high = largest.band
     above = f"to {high:.3g}" if math.isfinite(high) else "or more"
     return f"; finer meshes {low:.3g} {above}"

@@ -17,12 +17,8 @@ from fecm.mechanics.solutions import static_support
 from fecm.problem.estimates import MOST_SOLVED
 from fecm.results.criteria import spelt
 from fecm.results.end import LATE, OPEN_ENDS, OPEN_PEAKS, End
-from fecm.results.exposures import (
-    FEWEST,
-    RESOLVED,
-    count_evaluations,
-    largest_exposures,
-)
+from fecm.results.exposure_bands import LEAST_REACH
+from fecm.results.exposures import FEWEST, count_evaluations, largest_exposures
 from fecm.results.result import Result
 from fecm.results.run_metrics import start_w_of, steps_to_decide
 from fecm.results.stored import row_blocks
@@ -435,19 +431,31 @@ def _few_evaluations(simulation: Simulation, result: Result) -> Iterator[str]:
 
 
 def _coarse_elements(simulation: Simulation, result: Result) -> Iterator[str]:
-    """Yield a note if the elements are so large that exposures at the load are lower bounds."""
-    monitor = simulation.model.failure
-    if monitor is None or monitor.around is None or monitor.around.coarseness <= RESOLVED:
+    """Yield a note if finer meshes may change the exposures at the load much."""
+    mesh = simulation.model.load_mesh
+    if mesh is None or (mesh.is_measured and mesh.coarseness <= mesh.resolved):
         return
     reach, unit = simulation.problem.reach_of_load, result.units.get("length", "")
-    side, radius, needed = (
+    side, radius, needed, length = (
         f"{factor * reach:.3g} {unit}".rstrip()
-        for factor in (monitor.around.coarseness, 1.0, RESOLVED)
+        for factor in (mesh.coarseness, 1.0, mesh.resolved, mesh.bending_reach)
     )
-    yield (
-        f"exposures at the load are lower bounds: the elements there have sides of {side}, and "
-        f"c + h/2 is {radius}; refine the mesh at the load to sides of {needed}"
-    )
+    known = "have a wide band" if mesh.is_measured else "are not bounded"
+    compare = "compare them with those of a finer mesh (fecm check --mesh-error)"
+    if not mesh.nine_nodes:
+        why = f"the elements there do not have nine nodes; {compare}"
+    elif mesh.bending_reach < LEAST_REACH:
+        why = (
+            f"the load bends the plate over {length}, and c + h/2 is {radius}: the plate is too "
+            f"thick for a band; {compare}"
+        )
+    else:
+        where = "" if mesh.at_corner else ", and place a corner of elements at the load"
+        why = (
+            f"the elements there have sides of {side}, and c + h/2 is {radius}; refine the mesh at "
+            f"the load to sides of {needed}{where}"
+        )
+    yield f"exposures at the load {known}: {why}"
 
 
 def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:

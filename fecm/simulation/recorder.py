@@ -19,7 +19,7 @@ from fecm.mechanics.plate_motion import DofSums, PlateState
 from fecm.mechanics.strains import STRAINS, midplane_height
 from fecm.problem.build import ImpactModel
 from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA
-from fecm.results.exposures import COARSENESS, LOAD_FACTOR
+from fecm.results.exposures import LOAD_FACTOR
 from fecm.results.groups import GROUPS
 from fecm.results.metrics import INITIAL_PLATE
 from fecm.results.schema import (
@@ -430,10 +430,8 @@ class Recorder:
             self._sink.attributes("failure", {"modes": list(model.failure.modes)})
             if self._own_criteria:
                 self._sink.attributes("failure", {OWN_CRITERIA: list(self._own_criteria)})
-            if model.failure.around is not None:
-                self._sink.attributes(
-                    "failure/circle", {COARSENESS: model.failure.around.coarseness}
-                )
+            if model.load_mesh is not None:
+                self._sink.attributes("failure/circle", model.load_mesh._asdict())
         for path, array in self._constants().items():
             self._sink.write(path, 0, array)
         if self._room["tape8"]:

@@ -17,7 +17,7 @@ from fecm.deck.model import Curvature, Preload, Segment
 from fecm.deck.units import column_name, quantity
 from fecm.problem.generate import generate
 from fecm.problem.symmetry import symmetry_of
-from fecm.results.exposures import RESOLVED
+from fecm.results.exposure_bands import is_bounded
 from fecm.results.metrics import FACTOR, FOUND_BAND, RATIO
 from fecm.results.stored import whole_plate
 from fecm.results.validity import (
@@ -38,7 +38,7 @@ from fecm.sweeps.stored import StoredSweep
 GIVEN = 6  # digits of the values of a case, unless others are closer
 MOST_REASONS = 5  # of failure, that the summary lists
 WEIGHED = ("mass", "rod_mass", "energy")  # values that the summary shows in g and J
-WIDE = 0.75  # share of an energy found that finer meshes leave where the load is resolved
+WIDE = 0.75  # share of an energy found that finer meshes leave if the load is resolved
 SAME_PLACE = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
 
 
@@ -103,6 +103,8 @@ def _found_band(result: StoredSweep, case: int) -> str:
     low, high = (float(result[name][case]) for name in FOUND_BAND)
     if math.isnan(low) or math.isnan(high):
         return ""
+    if not is_bounded((low, high)):
+        return "; finer meshes not bounded"
     unit = result.unit("found_energy")
     return f"; finer meshes {quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
 
@@ -187,8 +189,8 @@ def remarks(result: StoredSweep) -> Iterator[str]:
     if wide := _decided_by_mesh(result):
         yield (
             f"the mesh decides the energy in {wide} of {len(result)} cases: finer meshes may "
-            f"find less than {WIDE:g} of it; the elements at the load are larger than "
-            f"{RESOLVED:g} (c + h/2); refine them (fecm new --grading)"
+            f"find less than {WIDE:g} of it; refine the mesh at "
+            "the load, and place a corner of elements there (fecm new --grading)"
         )
     bent = [reason for reason, _ in counted(result.validity) if reason in BENT.values()]
     if bent:

@@ -16,7 +16,7 @@ from fecm.mechanics.points import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError
 from fecm.problem.contact_estimates import expected_peak
 from fecm.problem.problem import ContactPatch, Problem
 from fecm.problem.rules.contact import sphere_radius
-from fecm.results.exposures import RESOLVED
+from fecm.results.exposure_bands import RESOLVED
 
 LARGE = 2.0  # radius of a patch over the thickness, and over the radius of the contact
 INDENTER = 0.5  # radius of a patch over that of a sphere with the deck's k
