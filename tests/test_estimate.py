@@ -53,8 +53,8 @@ def test_a_model_out_of_its_range_is_marked(tmp_path: Path) -> None:
         assert [model.applies for model in found.models] == expected[name]
     (tmp_path / "d.inp").write_text(text)
     lines = call("estimate", "d.inp", cwd=tmp_path).stdout.splitlines()
-    assert any(line.startswith("  infinite plate (out of range)  ") for line in lines)
-    assert not any(line.startswith("  static plate (out") for line in lines)
+    assert not any(line.startswith("  infinite plate") for line in lines)  # for small masses
+    assert any(line.startswith("  static plate  ") for line in lines)
 
 
 def test_a_held_plate_has_a_static_model_with_its_own_stiffness() -> None:

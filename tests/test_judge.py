@@ -451,6 +451,34 @@ def test_a_plate_on_a_window_is_told_one_error_which_is_that_of_nonlinear_runs(
     assert "window" in words
 
 
+def on_metal(contact: fecm.Contact, energy: str) -> fecm.Result:
+    """A steel sphere of 1 kg on 4 mm of aluminium, mm-N-s."""
+    deck = fecm.impact(
+        fecm.Plate.rectangle((100.0, 100.0), (4, 4), support="clamped"),
+        fecm.Laminate([0], "2024-T3", 4.0),
+        fecm.RigidMass(1e-3),
+        contact,
+        energy=energy,
+        duration=1.5e-3,
+        kinematics="linear",
+    )
+    return fecm.run_one(deck)
+
+
+def test_an_elastic_contact_far_beyond_yield_has_a_note_with_the_mean_pressure() -> None:
+    law = fecm.Contact(228617.0)  # of a steel sphere of 8 mm on 2024-T3, by Hertz
+    (note,) = [text for text in on_metal(law, "5J").notes if "mean contact pressure" in text]
+    force = float(on_metal(law, "5J").force.max())
+    indentation = (force / 228617.0) ** (2.0 / 3.0)
+    times = force / (np.pi * 8.0 * indentation) / 345.0  # sigma_y of the catalogue, MPa
+    assert times > 5.0
+    said = re.search(r"about (\S+) times the yield stress 345 N/mm\^2", note)
+    assert said is not None
+    assert float(said[1]) == pytest.approx(times, rel=0.02)
+    for other in (on_metal(law, "1mJ"), on_metal(fecm.Contact(228617.0, 0.0, 0.4, 2.5), "5J")):
+        assert not any("mean contact pressure" in text for text in other.notes)
+
+
 def test_the_indentation_of_a_sandwich_is_compared_with_the_face_that_is_struck() -> None:
     core: Any = (0, "Divinycell-H60", 10.0)
     deck = fecm.impact(

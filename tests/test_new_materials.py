@@ -309,6 +309,16 @@ def test_a_sweep_over_the_cure_of_several_materials_is_that_of_single_runs() -> 
             assert found[f"exposure_{one.criterion}"][row] == pytest.approx(one.exposure, rel=1e-9)
 
 
+def test_an_interface_of_a_core_has_the_mode_of_the_core() -> None:
+    deck = deck_of(*SANDWICH, "--units", "mm-N-s", "--damage").with_(duration=5e-5)
+    (largest,) = (e for e in largest_exposures(fecm.run_one(deck)) if e.criterion == "interlaminar")
+    layers = deck.require(Material).layers
+    core = next(n for n, layer in enumerate(layers, start=1) if layer.thickness > 1.0)
+    beside_the_core = largest.ply in (core - 1, core)
+    assert largest.mode == ("shear of the core" if beside_the_core else "interlaminar shear")
+    assert beside_the_core
+
+
 def test_a_sandwich_has_no_delamination_threshold() -> None:
     options = (*SANDWICH, "--units", "mm-N-s", "--damage")
     made = new(*LAW, *options)

@@ -10,12 +10,14 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.deck import model
+from fecm.deck.units import MODULUS, in_si, unit_names
 from fecm.mechanics.laminate import LaminateSection, effective_rigidity
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.parts import build_constants, build_projectile
 
+STEEL_IN_SI, STEEL_POISSON = 207e9, 0.3  # elastic constants of steel, in m, N and s
 # A clamped square plate under a central force has the stiffness D/(0.0056 a^2): Timoshenko and
 # Woinowsky-Krieger, Theory of Plates and Shells, Table 35.  The square of its
 # force over the force 8 v (m D)^(1/2) of a wave is this factor times the ratio of the masses.
@@ -55,6 +57,25 @@ def contact_stiffness(deck: model.Deck, plate: PlateModel, factor: int = 1) -> f
         if not peak > 0.0:
             return 0.0
         return float(force * max(1.5 / peak, law.q / (peak - law.permanent(peak))))
+
+
+def mean_pressure(deck: model.Deck, ply: model.Ply, force: float) -> float:
+    """Return the mean pressure under a sphere with the k of the deck on an isotropic ply.
+
+    The sphere's radius R follows from equation 3-2; the sphere is of steel where UNIT names the
+    units, otherwise rigid. The radius of the contact is (R alpha)^(1/2). The result is force/area.
+    It is 0 if the law has a permanent indentation at this force: such a law is that of a metal that
+    flows.
+    """
+    law = build_constants(deck.require(model.Indentation))
+    indentation = (force / law.k) ** (2.0 / 3.0)
+    if not indentation > 0.0 or law.permanent(indentation) > 0.0:
+        return 0.0
+    compliance = (1.0 - ply.nu12**2) / ply.e1
+    if (size := in_si(MODULUS, unit_names(deck))) is not None:
+        compliance += (1.0 - STEEL_POISSON**2) / (STEEL_IN_SI / size)
+    radius = (0.75 * law.k * compliance) ** 2
+    return float(force / (math.pi * radius * indentation))
 
 
 class ContactStep(NamedTuple):

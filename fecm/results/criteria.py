@@ -7,9 +7,11 @@ from typing import Any
 
 from fecm.deck.model import Allowables, Deck
 from fecm.mechanics.failure import CRITERIA, PlyExposure
+from fecm.mechanics.laminate import are_cores
 
 INTERLAMINAR = "interlaminar"  # criterion of the interfaces; the others belong to plies
 ALL_CRITERIA = (*CRITERIA, INTERLAMINAR)
+CORE_SHEAR = "shear of the core"  # mode of the interfaces of a sandwich's core
 YIELD = "yield"  # mode of all criteria of plies in an isotropic material
 # Largest relative difference of a shear modulus from E/(2 (1 + nu)) of an isotropic material, as
 # moduli are measured: 2 % in a named metal and 25 % in a named foam; more than half in fabrics.
@@ -76,9 +78,14 @@ def materials_at(deck: Deck, laminate: int, criterion: str, ply: int) -> tuple[s
 def mode_at(deck: Deck, laminate: int, criterion: str, ply: int, mode: str) -> str:
     """Return the name of a mode in a ply of a numbered laminate.
 
-    Isotropic materials have the mode :data:`YIELD`.
+    Isotropic materials have the mode :data:`YIELD`, interfaces of a core :data:`CORE_SHEAR`: face
+    and core have the same shear stress, and the core is the weaker one.
     """
-    layer = next(iter(deck.layers.get(laminate, ())[ply - 1 : ply]), None)
+    layers = deck.layers.get(laminate, ())
+    layer = next(iter(layers[ply - 1 : ply]), None)
+    if criterion == INTERLAMINAR and layer is not None:
+        is_core = are_cores([deck.plies[layer.material] for layer in layers])
+        return CORE_SHEAR if any(is_core[ply - 1 : ply + 1]) else mode
     if criterion in CRITERIA and layer is not None and is_isotropic(deck, layer.material):
         return YIELD
     return mode
@@ -91,6 +98,24 @@ def exposed(deck: Deck, laminate: int, exposure: PlyExposure) -> str:
     return (
         f"{mode}, {spelt(exposure.criterion)}, {where(exposure.criterion, exposure.ply, materials)}"
     )
+
+
+def yield_stress(deck: Deck, material: int) -> float:
+    """Return the yield stress of an isotropic material: XT of ALLO, or of the catalogue.
+
+    It is 0 for other materials, and where it is not known.
+    """
+    if not is_isotropic(deck, material):
+        return 0.0
+    card = deck.last(Allowables)
+    if card is not None and (strengths := card.of(material)) is not None:
+        return strengths.xt
+    from fecm.deck.catalogue import named_ply, system_of  # reads the catalogue: 2 ms
+
+    system = system_of(deck)
+    named = named_ply(deck.plies[material], system)
+    known = None if named is None or system is None else named.allowables(system)
+    return 0.0 if known is None else known.xt
 
 
 def is_isotropic(deck: Deck, material: int) -> bool:

@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._typing import Array, Floats
-from fecm.deck.model import Gages
-from fecm.deck.units import in_si, quantity, unit_of
+from fecm.deck.model import Gages, Indentation
+from fecm.deck.units import MODULUS, in_si, quantity, unit_of
 from fecm.mechanics.mesh import rigid_deflections
 from fecm.mechanics.points import shortest_side
 from fecm.mechanics.solutions import static_support
+from fecm.problem.contact_estimates import mean_pressure
 from fecm.problem.estimates import MOST_SOLVED
-from fecm.results.criteria import spelt
+from fecm.results.criteria import spelt, yield_stress
 from fecm.results.end import LATE, OPEN_ENDS, OPEN_PEAKS, End
 from fecm.results.exposure_bands import LEAST_REACH
 from fecm.results.exposures import FEWEST, count_evaluations, largest_exposures
@@ -257,6 +258,7 @@ PULL = 0.1
 STATIC = 0.5
 STANDARD_GRAVITY = 9.80665  # m/s^2
 HEAVY = 0.02  # share of the peak force that gravity adds, above which a note says so
+FULLY_PLASTIC = 3.0  # mean pressure over the yield stress at which a metal flows under a sphere
 LATER = 1.1  # least ratio of a later contact's peak to the first's for a note
 
 
@@ -290,7 +292,7 @@ def judge_run(simulation: Simulation, result: Result) -> RunVerdict:
         notes.append(OPEN_ENDS[end] + _remedy(result, end))
     notes += [*_later_peak(result), *_late_values(result, end)]
     notes += [*_pull(simulation, result), *_gravity(simulation, result)]
-    notes += _springs_back(simulation, result)
+    notes += [*_springs_back(simulation, result), *_yielding(simulation, result)]
     reasons = [Reason.AGAIN] if end is End.AGAIN else [Reason.OPEN] if end in OPEN_PEAKS else []
     reasons += [doubt.reason for doubt in beyond]
     peak_force = result.symmetry_factor * simulation.state.monitor.peak_force
@@ -400,6 +402,26 @@ def _springs_back(simulation: Simulation, result: Result) -> Iterator[str]:
             f"the impact starts at w = {w} under the load, but the nodal forces do not hold the "
             "plate there during the impact: it moves without the projectile too; a static solution "
             "at the load factor of the impact, to the default tolerance, would be held"
+        )
+
+
+def _yielding(simulation: Simulation, result: Result) -> Iterator[str]:
+    """Yield a note if an elastic contact presses on a metal far beyond its yield stress."""
+    deck, number = simulation.problem.deck, simulation.problem.laminate_number
+    material = list(deck.layers.values())[number][0].material
+    if deck.last(Indentation) is None or "law" in result.attributes:
+        return
+    stress = yield_stress(deck, material)
+    if not stress:
+        return
+    pressure = mean_pressure(deck, deck.plies[material], float(result["history/force"].max()))
+    if pressure > FULLY_PLASTIC * stress:
+        size = quantity(stress, unit_of(MODULUS, result.units))
+        yield (
+            f"the mean contact pressure reaches about {pressure / stress:.2g} times the yield "
+            f"stress {size} of the struck face: beyond 3 a metal flows, and an elastic law has too "
+            "large a force and rebound and no permanent indentation; measure the law (fecm indent "
+            "fit)"
         )
 
 

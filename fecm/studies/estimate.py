@@ -29,6 +29,7 @@ from fecm.studies import StudyError
 # Mass of the projectile over the mass of the plate.
 SMALL = 0.1  # ratio below which waves control the impact
 LARGE = 50.0  # ratio above which the impact is quasi-static
+INFINITE_PLATE = "infinite plate"  # name of the model for small masses
 # Remark on the nonlinear static plate, from clamped and simply supported isotropic circular plates.
 LOW = "the nonlinear static plate is 9 to 26 % low in force at M/M_plate = 24"
 
@@ -87,9 +88,7 @@ def quick_estimate(problem: Problem) -> QuickEstimate:
     reached = _velocity_at_peak(
         _peaks_on_infinite_plate(problem, mass), velocity, SMALL_MASS * force
     )
-    models = [
-        QuickModel("infinite plate", small, SMALL_MASS * force, reached, applies=ratio < SMALL)
-    ]
+    models = [QuickModel(INFINITE_PLATE, small, SMALL_MASS * force, reached, applies=ratio < SMALL)]
     stiffness = whole_stiffness(problem)
     if not math.isfinite(stiffness):
         return QuickEstimate(mass, ratio, parameter, stiffness, tuple(models))

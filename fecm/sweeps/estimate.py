@@ -14,7 +14,7 @@ from fecm.problem.loading import sole_problem
 from fecm.problem.problem import Problem
 from fecm.results.metrics import RATIO
 from fecm.results.validity import TOO_SOFT, Judge, unsafe
-from fecm.studies.estimate import QuickEstimate
+from fecm.studies.estimate import INFINITE_PLATE, LARGE, SMALL, QuickEstimate
 from fecm.studies.estimate import quick_estimate as by_quick_models
 from fecm.sweeps.execute import carry_out_plan
 from fecm.sweeps.plan import plan
@@ -115,7 +115,9 @@ class Estimate:
             ("stiffness", f"{self._text(self.stiffness, 'force/length')}{free}"),
             *self.remarks.items(),
         ]
-        models = tuple(self._row(name, model) for name, model in self.models.items())
+        models = tuple(
+            self._row(name, model) for name, model in self.models.items() if self._may_apply(name)
+        )
         header = ("model", *(name.replace("_", " ") for name in COLUMNS))
         return Table(tuple(shared), title=self.title or "(no title)"), Table(models, header)
 
@@ -128,6 +130,12 @@ class Estimate:
         """Return tables of the estimate and its notes, for notebooks."""
         notes = (Table(tuple(("note", note) for note in self.notes)),) if self.notes else ()
         return html_table(*self._tables(), *notes)
+
+    def _may_apply(self, name: str) -> bool:
+        """Return whether a model is for masses such as this one, so that the page has its row."""
+        if name == INFINITE_PLATE:
+            return self.mass_ratio <= LARGE
+        return name == RUN or self.mass_ratio >= SMALL
 
     def _row(self, name: str, model: ModelEstimate) -> Row:
         """Return the row of a model."""
