@@ -94,6 +94,13 @@ class Symmetry(NamedTuple):
             coordinates = np.concatenate([coordinates, images])
         return coordinates
 
+    def images(self, mesh: MeshArrays) -> Floats:
+        """Return the number of nodes of the whole plate that each node of the part stands for."""
+        counts = np.ones(len(mesh.coordinates))
+        for line in self.struck:
+            counts[~nodes_on(mesh, line.axis, line.place)] *= 2.0
+        return counts
+
     @property
     def places(self) -> str:
         """Name the lines through the impact node."""

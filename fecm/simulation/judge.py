@@ -95,13 +95,17 @@ def _deflections(simulation: Simulation, result: Result) -> Iterator[RunPeak]:
     """
     problem = simulation.problem
     free = rigid_deflections(problem.mesh)
+    root = np.ones(1)
+    if free.size and problem.symmetry.factor > 1:  # the least squares of the whole plate
+        root = np.sqrt(problem.symmetry.images(problem.mesh))
+        free = np.linalg.qr(root[:, None] * free)[0]
     x, y = problem.mesh.coordinates[:, :2].T
     place = problem.load_place
     by_step = place is not None and not free.size and "history/plate_w" in result
     # Under the load the deflection is the mean over the patch, as in the summary.
     under = problem.under_load(x, y) & by_step
     for times, (w,) in _blocks(result, "tape3", ["w"]):
-        bent = np.abs(w - (w @ free) @ free.T)
+        bent = np.abs(w - (root * w @ free) @ free.T / root)
         yield _peak(np.where(under, 0.0, bent), times, x, y)
     if place is not None and by_step:
         for times, (w,) in _blocks(result, "history", ["plate_w"]):

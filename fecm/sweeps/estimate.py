@@ -13,6 +13,7 @@ from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.problem.loading import sole_problem
 from fecm.problem.problem import Problem
 from fecm.results.metrics import RATIO
+from fecm.results.stored import whole_plate
 from fecm.results.validity import TOO_SOFT, Judge, unsafe
 from fecm.studies.estimate import INFINITE_PLATE, LARGE, SMALL, QuickEstimate
 from fecm.studies.estimate import quick_estimate as by_quick_models
@@ -210,6 +211,8 @@ def estimate_problem(problem: Problem) -> Estimate:
             *bent,
         ]
     remarks: dict[str, str] = {}
+    if text := whole_plate(problem.symmetry.factor):
+        remarks["symmetry"] = text
     if problem.damping:
         remarks["damping"] = "in the run only: the models without a mesh neglect DAMP"
     if problem.plate.is_preloaded:
