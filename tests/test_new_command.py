@@ -600,7 +600,7 @@ def test_a_title_names_plate_layup_ply_and_energy(options: tuple[str, ...], titl
 
 @pytest.mark.parametrize(
     "option",
-    [("--projectile", "mass:5.5kg"), ("--contact", "estimate:8mm"), ("--ply-thickness", ".184 mm")],
+    [("--projectile", "mass:5.5kg"), ("--contact", "estimate:8mm"), ("--ply-thickness", ".184 kg")],
 )
 def test_a_unit_where_a_number_is_needed_is_named(option: tuple[str, str]) -> None:
     made = new(*D7136, *QUICK, *option)

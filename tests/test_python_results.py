@@ -22,7 +22,7 @@ import pytest
 import fecm
 from fecm.results import METRICS, MetricAttributes
 from fecm.sweeps import SchedulerError
-from tests.decks import DATA_CARDS, ROOT, small
+from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, ROOT, small
 
 UNITS = "UNIT\nin lbf s\n"
 DECK = small(data=UNITS + DATA_CARDS)
@@ -251,3 +251,59 @@ def test_the_package_is_imported_from_a_zip_file(tmp_path: Path) -> None:
         check=True,
     )
     assert done.stdout.split() == [str(Path("fecm.zip") / "fecm" / "__init__.py"), "Ply", "True"]
+
+
+ENERGY = "UNIT\nmm N s\n"
+METRIC = small(data=ENERGY + DATA_CARDS)
+
+
+def test_ranges_and_units_are_read_alike_in_python_and_on_the_command_line() -> None:
+    text = fecm.sweep(METRIC, ["velocity=50:115:3", "mass=1kg,2kg"])
+    mapping = fecm.sweep(METRIC, {"velocity": "50:115:3", "mass": "1kg,2kg"})
+    assert text["velocity"].tolist() == mapping["velocity"].tolist()
+    assert text["mass"].tolist() == mapping["mass"].tolist() == [1e-3, 2e-3] * 3
+    energies = fecm.Sweep(METRIC, {"energy": "1J:5J:5"}).all_cases
+    assert [case["energy"] for case in energies] == [1000.0, 2000.0, 3000.0, 4000.0, 5000.0]
+    layups = fecm.Sweep(METRIC, {"layup": "[0/90],[90/0]"}).all_cases
+    assert [case["layup"] for case in layups] == ["[0/90]", "[90/0]"]
+    dense = fecm.Sweep(METRIC, {"density": ["1.6g/cm^3"], "k": ["2e4N/mm^1.5"]}).all_cases
+    assert dense == ({"density": 1.6e-9, "k": 2e4},)
+
+
+@pytest.mark.parametrize(
+    "until", ["0.006kN", {"peak_force": "6N"}, {"peak_force": 6.0}, {"peak_force": "6"}]
+)
+def test_levels_of_searches_have_units(until: Any) -> None:
+    job = fecm.Sweep(METRIC, {"k": [1e6]}, until=until)
+    assert job.plan.settings.search is not None
+    assert job.plan.settings.search.level == 6.0
+
+
+def test_levels_of_probabilities_have_units() -> None:
+    job = fecm.Sweep(METRIC, random={"k": "normal:2e6,1e5"}, samples=16, exceed="peak_force=0.1kN")
+    assert job.plan.limits[0].value == 100.0
+    with pytest.raises(ValueError, match="not a number or one with a unit, as in 6kN"):
+        fecm.Sweep(METRIC, {"k": [1e6]}, until={"peak_force": "6kg"})
+
+
+def test_thicknesses_of_plies_have_units() -> None:
+    thin = fecm.Laminate("[0/90]s", "AS4/8552", "131um")
+    assert thin.thickness == fecm.Laminate("[0/90]s", "AS4/8552", 0.131).thickness == 0.524
+    assert fecm.Laminate([(0, "AS4/8552", "0.2mm")]).thickness == 0.2
+    with pytest.raises(ValueError, match="`ply_thickness` is '1kg', not a number or one with"):
+        fecm.Laminate("[0/90]s", "AS4/8552", "1kg")
+
+
+def test_several_values_are_not_one_value_of_a_deck() -> None:
+    deck = fecm.read_one(METRIC)
+    for values in ([50.0, 60.0], np.array([50.0, 60.0])):
+        with pytest.raises(ValueError, match=r"velocity is one value, .* fecm\.sweep runs a"):
+            deck.with_(velocity=values)  # type: ignore[arg-type]
+
+
+def test_times_of_ply_stresses_have_units() -> None:
+    result = fecm.run_one(small(PLY_PROGRAM, data=DISC + ENERGY + DATA_CARDS))
+    assert result.plies(time="2.5us").step.tolist() == [5]
+    assert result.plies(time=["2.5us", 5e-6]).step.tolist() == [5, 10]
+    with pytest.raises(ValueError, match="`time` is '1kg'"):
+        result.plies(time="1kg")

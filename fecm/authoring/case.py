@@ -11,10 +11,13 @@ from typing import NamedTuple
 from fecm._errors import FecmError
 from fecm.deck.findings import Findings
 from fecm.deck.model import Deck
+from fecm.deck.quantities import EXAMPLES, in_units
 from fecm.deck.reader import ParsedProblem
+from fecm.deck.units import UnitsError
 from fecm.problem.check import check_problem
 from fecm.problem.problem import Problem
 from fecm.problem.rules.time_step import UNSTABLE
+from fecm.results.metrics import COLUMNS
 
 Value = float | int | str
 Case = dict[str, Value]
@@ -95,12 +98,29 @@ class Limit(NamedTuple):
     value: float | str  # a number or :data:`THRESHOLD`
 
 
-def parse_exceed(text: str) -> Limit:
-    """Parse ``QUANTITY=NUMBER`` or ``peak_force=threshold``; raise CasesError for other texts."""
+def level_of(quantity: str, text: str, system: str | None) -> float:
+    """Parse a level of a quantity; one with a unit is converted to a system of units.
+
+    Raises CasesError if the text is not a finite number, or the unit does not fit.
+    """
+    dimension = COLUMNS[quantity].dimension if quantity in COLUMNS else ""
+    if dimension not in EXAMPLES:
+        return number_of_text(quantity, text)
+    try:
+        return number_of_text(quantity, repr(in_units(quantity, text, dimension, system)))
+    except UnitsError as error:
+        raise CasesError(str(error)) from None
+
+
+def parse_exceed(text: str, system: str | None = None) -> Limit:
+    """Parse ``QUANTITY=NUMBER`` or ``peak_force=threshold``; raise CasesError for other texts.
+
+    A number with a unit, as in ``peak_force=6kN``, is converted to the system of units.
+    """
     name, _, value = (part.strip() for part in text.partition("="))
     if not name or not value or (value == THRESHOLD and name != PEAK_FORCE):
         raise CasesError(f"`{text}`: write QUANTITY=NUMBER or {PEAK_FORCE}={THRESHOLD}")
-    return Limit(name, value if value == THRESHOLD else number_of_text(name, value))
+    return Limit(name, value if value == THRESHOLD else level_of(name, value, system))
 
 
 def check_limits(limits: Sequence[Limit], quantities: Sequence[str], *, threshold: bool) -> None:

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from fecm._errors import StudyError, did_you_mean
 from fecm._measured_tables import MeasuredTable, column_head, plain_unit, read_table
 from fecm.authoring.case import MOST_CASES, Case, CasesError, Value, check_count, number_of_text
-from fecm.authoring.parameters import is_number, text_of
 from fecm.authoring.values import (
     NAMES,
     ValueKind,
@@ -31,6 +30,7 @@ from fecm.authoring.values import (
     value_of,
     without_unit,
 )
+from fecm.deck.quantities import is_number, text_of
 from fecm.deck.units import MASS, VELOCITY, in_si, unit_in_si, unit_of, units_of
 
 MEASURED = "measured_"  # before the names of measured columns
@@ -374,6 +374,7 @@ def grid_cases(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
 def combined(vary: object, *, free: bool = False, system: str | None = None) -> list[Case]:
     """Return every combination of the values in the lists of `vary`.
 
+    Instead of a list, `vary` may have the text of a range or a list, as in ``1J:5J:5``.
     `free` and `system` are as in :func:`checked`. Raises CasesError if a name is unknown, a value
     is invalid, or values are not in a list.
     """
@@ -381,6 +382,9 @@ def combined(vary: object, *, free: bool = False, system: str | None = None) -> 
         raise CasesError(f'vary is {vary!r}; write a mapping such as {{"velocity": [50.0, 115.0]}}')
     lists: list[tuple[str, list[Value]]] = []
     for name, choices in vary.items():
+        if isinstance(choices, str) and not free and re.search("[:,]", choices):
+            lists.append(parse_vary(f"{name}={choices}", system))
+            continue
         values: list[Any] | None = None
         with suppress(TypeError):
             values = None if isinstance(choices, str | bytes) else list(choices)

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 from fecm.authoring.case import Case, CasesError, check_deck
 from fecm.authoring.cases import checked
-from fecm.authoring.parameters import EXAMPLES, in_units
+from fecm.authoring.parameters import in_units
 from fecm.authoring.timing import clock_of, with_clock
 from fecm.authoring.values import NAMES, apply_case, check_known, dimension_of
 from fecm.deck.catalogue import system_of
 from fecm.deck.findings import DeckError
 from fecm.deck.macros import Macro, compile_program, with_outputs
 from fecm.deck.model import END, MACROS, STOP, TITLE, Deck, Nonlinear
+from fecm.deck.quantities import EXAMPLES, text_of
 from fecm.deck.reader import Reader
 
 if TYPE_CHECKING:
@@ -119,10 +120,16 @@ def _in_deck_units(deck: Deck, values: Mapping[str, Any]) -> dict[str, Any]:
     system = system_of(deck)
     return {
         name: in_units(name, value, dimension_of(name), system)
-        if system and dimension_of(name) in EXAMPLES and value != "auto"
+        if system and dimension_of(name) in EXAMPLES and _is_single(value)
         else value
         for name, value in values.items()
     }
+
+
+def _is_single(value: object) -> bool:
+    """Return whether a value is a number or a text with one; "auto" and several values are not."""
+    text = text_of(value)
+    return text != "auto" if isinstance(text, str) else not isinstance(text, Iterable)
 
 
 def _with_kinematics(deck: Deck, *, nonlinear: object) -> Deck:

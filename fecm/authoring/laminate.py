@@ -13,9 +13,9 @@ import numpy as np
 from fecm._errors import did_you_mean
 from fecm._table import Row, Table, html_table
 from fecm._typing import Floats
-from fecm.authoring.parameters import ObjectError, check_numbers, check_positive
+from fecm.authoring.parameters import ObjectError, check_numbers, check_positive, in_units
 from fecm.deck import catalogue
-from fecm.deck.catalogue import MATERIALS, NamedPly
+from fecm.deck.catalogue import MATERIALS, STANDARD, NamedPly
 from fecm.deck.findings import Findings
 from fecm.deck.layup import LARGEST_ANGLE, parse_plies
 from fecm.deck.material_cards import MATERIAL
@@ -56,7 +56,7 @@ ENTRIES = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
 
 AnyPly = str | Ply | NamedPly
 # Angle, name of the material, and thickness of a ply. The laminate supplies missing parts.
-Entry = float | tuple[float, str] | tuple[float, str, float]
+Entry = float | tuple[float, str] | tuple[float, str, float | str]
 Layup = str | Sequence[Entry]
 
 
@@ -65,7 +65,7 @@ class LaminatePly(NamedTuple):
 
     angle: float  # degrees
     name: str = ""  # name of the material; empty if the layup does not name it
-    thickness: float | None = None  # length; None if the layup does not give it
+    thickness: float | str | None = None  # length; None if the layup does not give it
 
 
 @dataclass(frozen=True)
@@ -88,9 +88,10 @@ class Laminate:
         Name of a ply from the list of `fecm materials`, or constants in the units of the deck. A
         dictionary has several materials by their names in the layup; ``""`` stands for plies
         without a name.
-    ply_thickness : float or dict, optional
-        Thickness of one ply, length. A dictionary has thicknesses by the names of materials. The
-        default is the thickness of the named ply, if it is known.
+    ply_thickness : float, str or dict, optional
+        Thickness of one ply, length, also with a unit, as in ``"0.131mm"``. A dictionary has
+        thicknesses by the names of materials. The default is the thickness of the named ply, if it
+        is known.
 
     Raises
     ------
@@ -117,7 +118,7 @@ class Laminate:
 
     layup: Layup
     ply: AnyPly | Mapping[str, AnyPly] | None = None
-    ply_thickness: float | Mapping[str, float] | None = None
+    ply_thickness: float | str | Mapping[str, float | str] | None = None
 
     def __post_init__(self) -> None:
         plies = self.ply.values() if isinstance(self.ply, Mapping) else [self.ply]
@@ -126,7 +127,7 @@ class Laminate:
                 _resolve_ply(constants)
         for ply in self.plies:
             self.material(ply.name)
-            self.thickness_of(ply)
+            self.thickness_of(ply, STANDARD)  # any system: the text is checked
 
     @property
     def plies(self) -> tuple[LaminatePly, ...]:
@@ -160,7 +161,9 @@ class Laminate:
         """
         named = [item for ply in self.plies if isinstance(item := self._resolve(ply), NamedPly)]
         system = named[0].system if named else None
-        return _total([self.thickness_of(ply) or self._listed(ply, system) for ply in self.plies])
+        return _total(
+            [self.thickness_of(ply, system) or self._listed(ply, system) for ply in self.plies]
+        )
 
     @property
     def A(self) -> Floats:
@@ -234,12 +237,13 @@ class Laminate:
         what = f"the material {name!r}" if name else "a ply without a material"
         raise ObjectError(f"`layup` has {what}; the given materials are {names}")
 
-    def thickness_of(self, ply: LaminatePly) -> float | None:
-        """Return the thickness of a ply; None if the laminate does not give it."""
+    def thickness_of(self, ply: LaminatePly, system: str | None) -> float | None:
+        """Return the thickness of a ply in a system of units; None if the laminate lacks it."""
         default = self.ply_thickness
         if isinstance(default, Mapping):
             default = default.get(ply.name)
-        thickness = default if ply.thickness is None else ply.thickness
+        given = default if ply.thickness is None else ply.thickness
+        thickness = in_units("ply_thickness", given, "length", system)
         check_positive(ply_thickness=thickness)
         return thickness
 
@@ -369,7 +373,10 @@ def deck_plies(
         return Layer(number, ply.angle, thickness, numbers[ply.name])
 
     layups = [
-        tuple(layer(n, ply, item.thickness_of(ply)) for n, ply in enumerate(item.plies, start=1))
+        tuple(
+            layer(n, ply, item.thickness_of(ply, system))
+            for n, ply in enumerate(item.plies, start=1)
+        )
         for item in laminates
     ]
     different = list(dict.fromkeys(layups))

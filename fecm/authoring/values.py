@@ -25,12 +25,13 @@ from fecm.authoring.case import (
     number_of_text,
     pair_of_text,
 )
-from fecm.authoring.parameters import EXAMPLES, NUMBER, ObjectError, in_units, text_of
+from fecm.authoring.parameters import ObjectError, in_units
 from fecm.authoring.plates import PlateSetter, check_free_in_plane, free_in_plane
 from fecm.authoring.strike import Strike, StrikeSetter, strike_of
 from fecm.authoring.timing import stable_time_step, with_time_step
 from fecm.deck.grid import SUPPORTS
 from fecm.deck.model import Deck
+from fecm.deck.quantities import EXAMPLES, NUMBER, text_of
 from fecm.deck.units import TOUGHNESS
 from fecm.problem.parts import is_coupled, is_curved
 from fecm.results.metrics import COLUMNS, VERDICTS
@@ -332,6 +333,11 @@ def value_of(name: str, value: object, where: str, system: str | None = None) ->
         return parse_value(name, text, system)
     except (TypeError, ValueError) as error:
         text = str(error) if isinstance(error, CasesError) else f"{name} can't be {value!r}"
+        if isinstance(value, Iterable) and not isinstance(value, str):
+            text = (
+                f"{name} is one value, not a {type(value).__name__} of values; fecm.sweep runs a "
+                f'deck with several: fecm.sweep(deck, {{"{name}": values}})'
+            )
         raise CasesError(f"{where}: {text}") from None
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NoReturn, TypeVar
 
@@ -12,6 +13,7 @@ import click
 from click import option
 
 from fecm.authoring.laminate import Laminate as AuthoredLaminate
+from fecm.authoring.parameters import ObjectError, in_units
 from fecm.cli.options import (
     POSITIVE,
     SYSTEM,
@@ -23,7 +25,7 @@ from fecm.cli.options import (
     list_of,
     stack_options,
 )
-from fecm.deck.catalogue import MATERIALS, NamedPly, read_plies
+from fecm.deck.catalogue import MATERIALS, STANDARD, NamedPly, read_plies
 from fecm.deck.layup import LayupPly, parse_plies
 from fecm.deck.model import Ply
 
@@ -41,7 +43,7 @@ class LaminateOptions:
     """Layup and plies; values by the letter of a material, empty for plies without a letter."""
 
     layup: Sequence[LayupPly] | None
-    ply_thickness: dict[str, float] | None
+    ply_thickness: dict[str, float | str] | None
     ply: Sequence[float] | None  # constants
     material: dict[str, NamedPly] | None
     units: str | None  # system to which a named ply is converted
@@ -61,8 +63,13 @@ class LaminateOptions:
 
     @property
     def thickness(self) -> float | None:
-        """Thickness of a ply of a layup without letters."""
-        return (self.ply_thickness or {}).get("")
+        """Thickness of a ply of a layup without letters, in the units of the laminate."""
+        system = self.units or (None if self.named is None else self.named.system)
+        thickness = (self.ply_thickness or {}).get("")
+        try:
+            return in_units("ply_thickness", thickness, "length", system)
+        except ObjectError as error:
+            raise click.UsageError(as_options(str(error), vars(self))) from None
 
     @property
     def angles(self) -> list[float]:
@@ -136,7 +143,7 @@ def laminate_options(
             multiple=True,
             callback=_by_letter,
             required=thickness_required,
-            help=f"Thickness of a ply, also of one material.{default}",
+            help=f"Thickness of a ply, also with a unit, and also of one material.{default}",
         ),
         option(
             "--ply",
@@ -177,15 +184,21 @@ def _lettered(text: str) -> tuple[str, str]:
     return (letter, value) if equals and re.fullmatch(LETTER, letter) else ("", text)
 
 
-def _thickness(text: str) -> tuple[str, float]:
-    """Parse a thickness, perhaps with a letter."""
+def _thickness(text: str) -> tuple[str, float | str]:
+    """Parse a thickness, perhaps with a letter; ``0.131mm`` stays a text."""
     letter, value = _lettered(text)
-    return letter, float(POSITIVE.convert(value, None, None))
+    try:
+        return letter, float(POSITIVE.convert(value, None, None))
+    except click.BadParameter:
+        with suppress(ObjectError):
+            if (in_units("ply_thickness", value, "length", STANDARD) or 0.0) > 0.0:
+                return letter, value
+        raise
 
 
 def _by_letter(
-    context: click.Context, parameter: click.Parameter, pairs: Iterable[tuple[str, float]]
-) -> dict[str, float] | None:
+    context: click.Context, parameter: click.Parameter, pairs: Iterable[tuple[str, float | str]]
+) -> dict[str, float | str] | None:
     """Collect the values by letter; None without values."""
     return unique(pairs, context, parameter) or None
 

@@ -97,8 +97,8 @@ def _texts(form: str) -> dict[str, Any]:
 )
 @option(
     "--find",
-    type=click.Choice(["velocity"]),
-    help="Search in every case for the velocity at which --until holds.",
+    type=click.Choice(["velocity", "energy"]),
+    help="Search in every case for the velocity and the energy at which --until holds.",
 )
 @option(
     "--scheduler-file",

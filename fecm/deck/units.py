@@ -50,6 +50,7 @@ NAMED = {
     MASS: {"kg": 1.0, "g": 1e-3, "t": 1e3},
     MODULUS: {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
     TOUGHNESS: {"J/m^2": 1.0, "kJ/m^2": 1e3},
+    DENSITY: {"kg/m^3": 1.0, "g/cm^3": 1e3, "t/m^3": 1e3},
 }
 
 
@@ -110,15 +111,25 @@ def in_si(dimension: str, names: dict[str, str]) -> float | None:
 def unit_in_si(unit: str, dimension: str) -> float | None:
     """Return the size in m, N and s of a unit such as ``mm/s`` or ``J``; None if it is not valid.
 
-    The dimension is a product or a quotient of length, force and time, without powers.
+    The dimension is a product or a quotient of powers of length, force and time.
+
+    Examples
+    --------
+    >>> unit_in_si("N/mm", TOUGHNESS), unit_in_si("g/cm^3", DENSITY)
+    (1000.0, 1000.0)
     """
     if (value := NAMED.get(dimension, {}).get(unit)) is not None:
         return value
     words, names = re.split(r"([*/])", dimension), re.split(r"([*/])", unit.replace(" ", ""))
     if len(words) != len(names) or words[1::2] != names[1::2]:
         return None
-    units = dict(zip(words[::2], names[::2], strict=True))
-    return in_si(dimension, units)
+    pairs = [
+        (*word.partition("^")[::2], *name.partition("^")[::2])
+        for word, name in zip(words[::2], names[::2], strict=True)
+    ]
+    if any(power != given for _, power, _, given in pairs):
+        return None
+    return in_si(dimension, {word: name for word, _, name, _ in pairs})
 
 
 def thousands(value: float) -> int:

@@ -346,7 +346,7 @@ def _axis_names(dataset: Dataset) -> list[str]:
     ]
 
 
-def pyvista_grid(stored: Stored, time: float | None) -> pyvista.UnstructuredGrid:
+def pyvista_grid(stored: Stored, time: float | str | None) -> pyvista.UnstructuredGrid:
     """Return the plate with its displacements at a time; see :meth:`fecm.Result.to_pyvista`."""
     try:
         import pyvista  # optional
@@ -356,7 +356,11 @@ def pyvista_grid(stored: Stored, time: float | None) -> pyvista.UnstructuredGrid
 
     if "tape3/w" not in stored:
         raise NotStoredError("there are no displacements (tape3) in this result; add DISP")
-    (row,) = [-1] if time is None else rows_at(stored["tape3/time"], [time], "displacements")
+    (row,) = (
+        [-1]
+        if time is None
+        else rows_at(stored["tape3/time"], stored.times_of(time), "displacements")
+    )
     connectivity, offsets, types = vtk_cells(stored["mesh/elements"])
     cells = np.insert(connectivity, offsets[:-1], np.diff(offsets))
     grid: Any = pyvista.UnstructuredGrid(cells, types, vtk_points(stored))

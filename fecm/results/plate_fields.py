@@ -153,7 +153,7 @@ def _rows_of(
     if not shared.all():
         were = f"were stored at {shared.sum()} of {len(steps)} time steps"
         note(f"{what} ({group}) {were}; at the others they are NaN")
-    if without:
+    if without and len(steps) == len(stored["tape3/step"]):  # all rows, not one time
         note(
             f"{without} of {len(stored_steps)} rows of {what} ({group}) have no displacements "
             f"(tape3) at their step and are omitted. {SHARE}"

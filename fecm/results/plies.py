@@ -87,15 +87,16 @@ class PlyGroup(PlyRows):
 
     def __call__(
         self,
-        time: float | Sequence[float] | None = None,
+        time: float | str | Sequence[float | str] | None = None,
         elements: int | Sequence[int] | None = None,
     ) -> PlyResults:
         """Return stresses and strains ply by ply.
 
         Parameters
         ----------
-        time : float or sequence of float, optional
-            Times, for which the nearest stored rows are taken; all rows by default.
+        time : float, str or sequence, optional
+            Times, also with a unit, as in ``"50us"``, for which the nearest stored rows are taken;
+            all rows by default.
         elements : int or sequence of int, optional
             Numbers of elements; by default all with ply stresses.
 
@@ -118,7 +119,7 @@ class PlyGroup(PlyRows):
         times, numbers, z = (stored[f"plies/{name}"] for name in ("time", "element", "z"))
         rows = np.arange(len(times))
         if time is not None:
-            rows = rows_at(times, np.atleast_1d(time), "ply stresses")
+            rows = rows_at(times, stored.times_of(time), "ply stresses")
         members = np.arange(len(numbers))
         if elements is not None:
             members = _members(numbers, np.atleast_1d(elements))

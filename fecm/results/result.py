@@ -149,7 +149,7 @@ class Result(Stored, schema.ContactRows, MetricAttributes):
 
         return datatree(self)
 
-    def to_pyvista(self, time: float | None = None) -> pyvista.UnstructuredGrid:
+    def to_pyvista(self, time: float | str | None = None) -> pyvista.UnstructuredGrid:
         """Return the plate and its fields at a time, as point and cell data; needs PyVista.
 
         The fields are those of ``fecm export --to vtkhdf`` (docs/results.md): displacements,
@@ -159,8 +159,9 @@ class Result(Stored, schema.ContactRows, MetricAttributes):
 
         Parameters
         ----------
-        time : float, optional
-            The nearest row of displacements is taken; by default the last.
+        time : float or str, optional
+            Time, also with a unit, as in ``"50us"``. The nearest row of displacements is taken; by
+            default the last.
 
         Raises
         ------

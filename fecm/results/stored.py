@@ -10,10 +10,13 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from fecm._arrays import read_only
 from fecm._errors import ResultFileError
-from fecm._typing import Array
+from fecm._typing import Array, Floats
 from fecm.deck.model import Deck
+from fecm.deck.quantities import in_units
 from fecm.deck.reader import Reader
 from fecm.deck.units import declared_units, unit_of
 from fecm.results.groups import Attributes, NotStoredError, check_name, not_stored
@@ -215,6 +218,15 @@ class Stored:
         if self.symmetry_factor == 1 or not is_shared:
             return self[name]
         return read_only(self.symmetry_factor * self[name])
+
+    def times_of(self, time: object) -> Floats:
+        """Return one or several times as numbers; texts with a unit are converted to the deck's.
+
+        Raises UnitsError if a time is not a number or its unit does not fit.
+        """
+        system = "-".join(self.units.values()) or None
+        asked = np.atleast_1d(np.asarray(time, dtype=object)).tolist()
+        return np.array([in_units("time", one, "time", system) for one in asked], float)
 
     def attributes_of(self, group: str) -> dict[str, Any]:
         """Return the attributes of a group; empty without the group."""

@@ -79,6 +79,7 @@ from fecm.sweeps.random import (
     random_cases,
 )
 from fecm.sweeps.result import SweepResult
+from fecm.sweeps.search import with_level
 
 Named = str | Sequence[str]  # one text of the form NAME=..., or several
 
@@ -134,7 +135,7 @@ class Sweep:
         None,
         "Values by name, FROM:TO:N or A,B,C, also with a unit, as in energy=5J:30J:6; all "
         f"combinations are run.  Names: {', '.join(NAMES)}.",
-        python="Or a mapping of names to values.",
+        python="Or a mapping of names to values, or to such texts.",
         group="Cases",
     )
     cases: Iterable[Mapping[str, Any]] | CaseTable | Path | None = option(
@@ -286,16 +287,17 @@ class Sweep:
         if self.refine is not None:
             cases, measures = refined_cases(self.problem, self.refine), (Measure.DEFLECTION,)
         self._prepare_outputs(len(cases))
+        system = system_of(self.problem.deck)
         self.plan: Plan = plan(
             self.problem,
             cases,
             history=self.history,
-            until=self.until,
+            until=with_level(self.until, system),
             build=self.build,
             measure=own_measure,
             extra=measures,
             design=design,
-            limits=_limits(self.exceed),
+            limits=_limits(self.exceed, system),
             modes=reduced_mode_count(self.model, self.modes),
             law=law,
             measured=measured,
@@ -645,14 +647,14 @@ def _by_name(option: str, argument: Any, form: str) -> dict[str, Any]:
     return values
 
 
-def _limits(exceed: Any) -> tuple[Limit, ...]:
+def _limits(exceed: Any, system: str | None) -> tuple[Limit, ...]:
     """Return limits of quantities, from texts or from values by name."""
     if texts := texts_of(exceed):
-        return tuple(map(parse_exceed, texts))
+        return tuple(parse_exceed(text, system) for text in texts)
     if not isinstance(exceed or {}, Mapping):
         raise CasesError(f'exceed is {exceed!r}; write {{"peak_force": [100.0]}} or the like')
     return tuple(
-        parse_exceed(f"{name}={value}")
+        parse_exceed(f"{name}={value}", system)
         for name, limit in (exceed or {}).items()
         for value in np.atleast_1d(limit).tolist()
     )

@@ -11,7 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._typing import Bools, Floats
-from fecm.authoring.case import NO_THRESHOLD, PEAK_FORCE, THRESHOLD, CasesError, parse_exceed
+from fecm.authoring.case import (
+    NO_THRESHOLD,
+    PEAK_FORCE,
+    THRESHOLD,
+    CasesError,
+    level_of,
+    parse_exceed,
+)
 from fecm.authoring.impacts import Impacts
 from fecm.deck.model import Deck, Delamination, Impact
 from fecm.results.exposures import FEWEST
@@ -55,7 +62,7 @@ class Search(NamedTuple):
 
 
 def parse_until(text: str) -> Until:
-    """Parse ``peak_force=VALUE`` or ``exposure=NUMBER``.
+    """Parse ``peak_force=VALUE`` or ``exposure=NUMBER``; :func:`with_level` converts the value.
 
     Raises CasesError if the text is neither.
     """
@@ -63,7 +70,26 @@ def parse_until(text: str) -> Until:
     if name not in tuple(Sought) or not value:
         forms = f"peak_force=NUMBER or peak_force={THRESHOLD}, or exposure=NUMBER"
         raise CasesError(f"`{text}`: write {forms}")
-    return {name: parse_exceed(text).value}
+    if value == THRESHOLD:
+        parse_exceed(text)  # only the peak force has one
+    return {name: value}
+
+
+def with_level(until: Until | None, system: str | None) -> Until | None:
+    """Return a search whose level, if it is a text such as ``6kN``, is a number of the system.
+
+    Raises CasesError if the text is not a number or its unit does not fit.
+    """
+    if isinstance(until, str) and until != THRESHOLD:
+        return level_of(PEAK_FORCE, until, system)
+    if isinstance(until, Mapping):
+        return {
+            name: level_of(name, level, system)
+            if isinstance(level, str) and level != THRESHOLD
+            else level
+            for name, level in until.items()
+        }
+    return until
 
 
 def search_of(until: Until | None) -> Search | None:
