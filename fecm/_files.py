@@ -81,8 +81,23 @@ def check_outputs(
         if path.is_symlink() and not overwrite:
             lack = f"{path} is a link to {target}, which does not exist"
             raise OutputExistsError(f"{lack}; overwrite=True creates it")
+        if _is_protected(target):
+            raise OutputError(
+                f"{path} belongs to another user, and {target.parent} lets only its owner replace "
+                "it (sticky bit); give another name"
+            )
         if not _discard(partial_of(target)):
             raise OutputError(f"{path} is being written by another process")
+
+
+def _is_protected(target: Path) -> bool:
+    """Return whether the folder of an existing file lets only other users replace it."""
+    try:
+        owners = target.lstat().st_uid, target.parent.stat().st_uid
+        is_sticky = bool(target.parent.stat().st_mode & stat.S_ISVTX)
+    except OSError:
+        return False
+    return is_sticky and os.name == "posix" and os.geteuid() not in (0, *owners)
 
 
 def _keys(path: Path) -> set[object]:

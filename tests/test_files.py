@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+import fecm
 from fecm import _files
 from fecm._files import OutputError, beside, check_outputs, partial_of
 from fecm.simulation import checkpoint_of
@@ -151,6 +152,23 @@ def test_a_replaced_file_keeps_its_permissions_and_is_private_until_then(
     mask = os.umask(0)
     os.umask(mask)
     assert stat.S_IMODE(Path("new").stat().st_mode) == 0o666 & ~mask
+
+
+@pytest.mark.posix
+def test_a_file_that_only_its_owner_may_replace_is_refused_before_the_computation(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shared = folder / "shared"
+    shared.mkdir()
+    shared.chmod(0o1777)
+    (shared / "r.h5").write_text("")
+    (folder / "link.h5").symlink_to(shared / "r.h5")
+    check_outputs([shared / "r.h5"], overwrite=True)
+    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+    check_outputs([shared / "new.h5"], overwrite=True)
+    for name in ("shared/r.h5", "link.h5"):
+        with pytest.raises(OutputError, match="belongs to another user"):
+            fecm.Run("d.inp", output=name, overwrite=True)
 
 
 @pytest.mark.posix

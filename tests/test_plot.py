@@ -439,9 +439,12 @@ def test_without_matplotlib_one_line_says_what_to_install(
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
-def test_the_same_picture_has_the_same_bytes(result: Result, tmp_path: Path, suffix: str) -> None:
+def test_the_same_picture_has_the_same_bytes(
+    result: Result, tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     written = []
-    for name in ("a", "b"):
+    for name, date in (("a", "0"), ("b", "x")):
+        monkeypatch.setenv("SOURCE_DATE_EPOCH", date)
         path = tmp_path / f"{name}.{suffix}"
         save_picture(draw("force", {"small": result}), path)
         written.append(path.read_bytes())

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -32,6 +32,18 @@ STRENGTHS = "ALLO\n   200000.   200000.     7000.    28000.    13000.\n\n"
 DECK = small(
     PLY_PROGRAM.replace("PLYS", "FAIL          1\nPLYS"), data=DISC + STRENGTHS + DATA_CARDS
 )
+
+
+def test_a_small_deck_is_read_without_room_for_the_largest_one() -> None:
+    class Recorded(io.BytesIO):
+        sizes: ClassVar[list[int]] = []
+
+        def read(self, size: int | None = -1, /) -> bytes:
+            self.sizes.append(-1 if size is None else size)
+            return super().read(size)
+
+    assert fecm.read_deck(Recorded(small().encode())) == fecm.read_deck(small())
+    assert 0 < min(Recorded.sizes) <= max(Recorded.sizes) <= 1_000_000
 
 
 def test_the_namespace_lists_the_public_names_and_nothing_else() -> None:

@@ -24,6 +24,7 @@ LARGEST_FILE = 1_000_000_000  # no deck needs more bytes
 # Memory of a deck, per byte of text and per line: upper bounds, measured at 10 MB.
 BYTES_A_BYTE = 12
 BYTES_A_LINE = 1100
+PART = 1_000_000  # bytes that are read at once; Python allocates them before it reads
 FIRST = 4096  # number of bytes that identify a binary file
 HDF5 = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
 INLINE = "<text>"  # name of a deck from a text, or from a stream without a name
@@ -56,7 +57,11 @@ def _read_text(file: AnyFile, path: str) -> str:
     if head.startswith(HDF5):
         raise InputError(f"{path} is an HDF5 file, not a deck; `fecm info {path}` shows a result")
     decoded(head, path)  # refuse a binary file before the rest is read
-    data = head + _read_bytes(file, max(0, most + 1 - len(head)))
+    parts, missing = [head], most + 1 - len(head)
+    while missing > 0 and (part := _read_bytes(file, min(missing, PART))):
+        parts.append(part)
+        missing -= len(part)
+    data = b"".join(parts)
     if len(data) > most:
         raise NotEnoughMemoryError(f"{path}: a deck of more than {format_bytes(most)} is not read")
     lines = data.count(b"\n") + data.count(b"\r") - data.count(b"\r\n")

@@ -274,7 +274,7 @@ def save_picture(
     """
     import matplotlib
 
-    from fecm.plot.style import RC, RESOLUTION, SCREEN, UNDATED
+    from fecm.plot.style import RC, RESOLUTION, SCREEN, save
 
     suffix = path.suffix.lower()
     with (
@@ -284,9 +284,7 @@ def save_picture(
         beside(path, overwrite=overwrite) as partial,
     ):
         if suffix != ANIMATION:
-            picture.figure.savefig(
-                partial, format=suffix[1:], dpi=RESOLUTION, metadata=UNDATED[suffix]
-            )
+            save(picture.figure, partial, suffix, RESOLUTION)
             return
         from matplotlib.animation import PillowWriter
 

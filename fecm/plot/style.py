@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 import re
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ContextDecorator
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import matplotlib
 import numpy as np
@@ -96,6 +98,19 @@ UNDATED: dict[str, dict[str, None]] = {
     ".svg": {"Date": None, "Creator": None},
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
+DATE = "SOURCE_DATE_EPOCH"  # which Matplotlib reads, and refuses if it is not a number
+
+
+def save(figure: Figure, file: Path | IO[bytes], suffix: str, dpi: float) -> None:
+    """Save a figure without a date: equal figures give equal bytes."""
+    date = os.environ.pop(DATE, None)
+    try:
+        figure.savefig(file, format=suffix[1:], dpi=dpi, metadata=UNDATED[suffix])
+    finally:
+        if date is not None:
+            os.environ[DATE] = date
+
+
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 # Decorator of functions that draw in this style.

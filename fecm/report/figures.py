@@ -42,11 +42,11 @@ def _bytes(figure: Figure, form: str) -> bytes:
     """Return a figure in a format. Equal figures give equal bytes."""
     import matplotlib
 
-    from fecm.plot.style import RC, UNDATED
+    from fecm.plot.style import RC, save
 
     file = io.BytesIO()
     with matplotlib.rc_context(RC), warnings.catch_warnings(action="ignore"):
-        figure.savefig(file, format=form, dpi=DOTS, metadata=UNDATED[f".{form}"])
+        save(figure, file, f".{form}", DOTS)
     return file.getvalue()
 
 
