@@ -402,7 +402,7 @@ def test_the_summary_has_impact_kinematics_cure_and_threshold() -> None:
         "kinematics  ",
     ):
         assert line in lines
-    assert "delamination        from " in lines
+    assert "delamination        at the latest from " in lines
 
 
 def test_the_coupling_of_a_symmetric_laminate_is_printed_as_zero() -> None:

@@ -288,7 +288,10 @@ def test_a_run_says_what_is_open_and_what_is_elastic_only() -> None:
     assert "peak not reached" in cut.validity
     threshold = float(whole.threshold["force"])
     told = "\n".join(run_summary(whole))
-    assert f"(elastic prediction; delamination is expected from {threshold:.4g} N" in told
+    assert (
+        f"(elastic prediction; delamination is expected at the latest from {threshold:.4g} N"
+        in told
+    )
     assert " absorbed (left in plate, indentation and projectile)" in told
     assert {"w > 0.3 h", "peak force > threshold"} <= set(whole.validity.split("; "))
 

@@ -81,7 +81,8 @@ def test_a_reader_of_the_page_alone_learns_what_happened(failed: Result, shown: 
     text = shown.text
     for said in (
         f"peak force {failed.force.max():.4g}",
-        "(elastic prediction; delamination is expected from 26.57, and the first ply fails before)",
+        "(elastic prediction; delamination is expected at the latest from 26.57, and the first ply "
+        "fails before)",
         "passes the delamination threshold of",
         "when the projectile has given up",
         f"first failure: {first.mode} ({first.criterion.replace('_', ' ')}), {first.where}",

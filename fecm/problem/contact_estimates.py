@@ -59,22 +59,25 @@ def contact_stiffness(deck: model.Deck, plate: PlateModel, factor: int = 1) -> f
         return float(force * max(1.5 / peak, law.q / (peak - law.permanent(peak))))
 
 
-def mean_pressure(deck: model.Deck, ply: model.Ply, force: float) -> float:
+def mean_pressure(deck: model.Deck, ply: model.Ply, force: float, parts: int) -> float:
     """Return the mean pressure under a sphere with the k of the deck on an isotropic ply.
 
-    The sphere's radius R follows from equation 3-2; the sphere is of steel where UNIT names the
-    units, otherwise rigid. The radius of the contact is (R alpha)^(1/2). The result is force/area.
+    `force` is the force on the whole plate. The deck models one of `parts` equal parts of it, and
+    its k is the k of the part. The sphere's radius R follows from equation 3-2; the sphere is of
+    steel where UNIT names the units, otherwise rigid. The radius of the contact is (R
+    alpha)^(1/2). The result is force/area.
     It is 0 if the law has a permanent indentation at this force: such a law is that of a metal that
     flows.
     """
     law = build_constants(deck.require(model.Indentation))
-    indentation = (force / law.k) ** (2.0 / 3.0)
+    k = parts * law.k
+    indentation = (force / k) ** (2.0 / 3.0)
     if not indentation > 0.0 or law.permanent(indentation) > 0.0:
         return 0.0
     compliance = (1.0 - ply.nu12**2) / ply.e1
     if (size := in_si(MODULUS, unit_names(deck))) is not None:
         compliance += (1.0 - STEEL_POISSON**2) / (STEEL_IN_SI / size)
-    radius = (0.75 * law.k * compliance) ** 2
+    radius = (0.75 * k * compliance) ** 2
     return float(force / (math.pi * radius * indentation))
 
 

@@ -251,7 +251,7 @@ def _plate_rows(summary: ProblemSummary) -> Iterator[Row]:
     if summary.cure is not None:
         yield ("cure", f"{summary.cure:+g} K")
     if summary.threshold is not None:
-        yield ("delamination", f"from {in_units(summary.threshold, 'force')}")
+        yield ("delamination", f"at the latest from {in_units(summary.threshold, 'force')}")
 
 
 def _impact_rows(summary: ProblemSummary) -> Iterator[Row]:

@@ -418,7 +418,8 @@ def _yielding(simulation: Simulation, result: Result) -> Iterator[str]:
     stress = yield_stress(deck, material)
     if not stress:
         return
-    pressure = mean_pressure(deck, deck.plies[material], float(result["history/force"].max()))
+    peak = float(result.whole("history/force").max())
+    pressure = mean_pressure(deck, deck.plies[material], peak, result.symmetry_factor)
     if pressure > FULLY_PLASTIC * stress:
         size = quantity(stress, unit_of(MODULUS, result.units))
         yield (
