@@ -22,7 +22,7 @@ from fecm.results.criteria import (
     where,
 )
 from fecm.results.exposure_bands import LoadMesh, mesh_band
-from fecm.results.stored import Stored
+from fecm.results.stored import Stored, computed_once
 
 LOWER_BOUNDS = "the run ends in contact: exposures are lower bounds"
 TIE = 1e-9  # relative difference of equal exposures; see fecm/mechanics/exposures.py
@@ -100,6 +100,7 @@ def band_of_largest(largest: Sequence[LargestExposure]) -> tuple[float, float]:
     return low, high
 
 
+@computed_once
 def largest_exposures(stored: Stored) -> list[LargestExposure]:
     """Return the largest exposure of each criterion, outside the load and on its circle.
 

@@ -28,7 +28,7 @@ from fecm.results.metrics import (
     Projectiles,
     impact_metrics,
 )
-from fecm.results.stored import Stored
+from fecm.results.stored import Stored, computed_once
 
 NOT_KNOWN = "not known"
 
@@ -150,6 +150,7 @@ def metrics_of(stored: Stored) -> dict[str, float]:
     return values | {name: int(values[name]) for name in INTEGERS if math.isfinite(values[name])}
 
 
+@computed_once
 def _summarised(stored: Stored) -> Metrics | None:
     """Return the metrics of the run as a single case; None without impact steps."""
     if "history/force" not in stored or not len(stored["history/force"]):

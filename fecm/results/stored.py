@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -65,6 +65,22 @@ def row_blocks(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
         yield start, min(start + step, rows)
 
 
+_Value = TypeVar("_Value")
+
+
+def computed_once(function: Callable[[Stored], _Value]) -> Callable[[Stored], _Value]:
+    """Compute a value of a result when it is first asked for; datasets do not change."""
+
+    @functools.wraps(function)
+    def value_of(stored: Stored) -> _Value:
+        values = stored._computed
+        if function.__qualname__ not in values:
+            values[function.__qualname__] = function(stored)
+        return cast("_Value", values[function.__qualname__])
+
+    return value_of
+
+
 class Stored:
     """Datasets, attributes and deck of a run."""
 
@@ -78,6 +94,7 @@ class Stored:
         self._arrays = arrays
         self._groups = groups
         self._model = model
+        self._computed: dict[str, object] = {}  # see `computed_once`
         self.attributes: dict[str, Any] = dict(groups.get("", {}))
         self.deck_text: str = texts.get("deck", "")
 
