@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -313,3 +314,12 @@ def test_runs_of_equal_signs_are_counted_in_standard_deviations() -> None:
     assert sign_runs(alternating) == pytest.approx(9.0 / np.sqrt(90.0 / 19.0))
     assert sign_runs(np.sort(alternating)) == pytest.approx(-9.0 / np.sqrt(90.0 / 19.0))
     assert sign_runs(np.ones(20)) == 0.0
+
+
+def test_a_fit_to_a_clipped_record_is_accepted_with_doubts_at_most() -> None:
+    force = humps()
+    for limit in (np.inf, 0.7 * force.max()):
+        with pytest.warns(fecm.FecmWarning) if np.isfinite(limit) else nullcontext():
+            fit = fecm.identify(started(), HUMPS, np.minimum(force, limit), ["velocity"])
+        assert any("is clipped" in doubt for doubt in fit.doubts) == np.isfinite(limit)
+        assert np.isfinite(limit) <= (fit.verdict != "yes")

@@ -11,6 +11,7 @@ import numpy as np
 from click import option
 
 from fecm._measured_tables import read_table
+from fecm._record_faults import record_faults
 from fecm.cli.common import DASH, RefusedError, note
 from fecm.cli.decks import load_valid
 from fecm.cli.options import (
@@ -240,6 +241,7 @@ def filter_(history: Path, transducer: Filter, column: str | None, targets: Outp
     clock = series.units.get("time", "")
     sensor = transducer.in_unit(clock)
     sensor.warn_without_effect(series.time, clock)
+    note(*record_faults(series.name, series.values, series.time, clock=clock, ends=False))
     filtered = sensor(series.time, series.values)
     named = {**series.beside, series.name: series.values, "filtered": filtered}
     targets.draw("studies:filter_picture", series.time, named, series.units, series.dimension)
@@ -303,8 +305,14 @@ def calibrate_command(
     if fit.slope < 0.0:
         note("the slope is negative: V_F and V_a have opposite signs; --columns time,V_F,-V_a")
     targets.draw("studies:calibration_picture", time, v_f, v_a, fit, units)
+    faults = [
+        fault
+        for name, values in (("V_F", v_f), ("V_a", v_a))
+        for fault in record_faults(name, values, time, clock=units[0], ends=False)
+    ]
+    note(*faults)
     if form is Format.JSON:
-        click.echo(json.dumps(vars(fit)))
+        click.echo(json.dumps({**vars(fit), "notes": faults}))
         return
     click.echo(f"points            {fit.points}")
     click.echo(f"slope V_F/V_a     {fit.slope:.6g} ± {fit.slope_error:.2g}")

@@ -405,7 +405,7 @@ def _identification(
         notes=(),
         law="" if model.law is None else law_name(model.law),
     )
-    doubts = tuple(filter(None, (fault, *_doubts(identification, points, model))))
+    doubts = tuple(filter(None, (fault, *measured.faults, *_doubts(identification, points, model))))
     remark = _points_left_out(identification, measured)
     if remark and points.lost > MANY_LOST:
         doubts = (remark, *doubts)

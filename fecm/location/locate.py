@@ -181,7 +181,8 @@ class LocationJob(LocationOptions):
         location = _location(problem, table, self, (fit, self._times), minima)
         cause = _find_cause(problem, table, self, searched) if is_doubtful(location) else None
         watch.advance(PARTS, PARTS)
-        return judged(location, region, wide, cause)
+        faults = table.faults(location.units.get("time", ""))
+        return judged(location, region, wide, cause, faults)
 
     def __repr__(self) -> str:
         return f"<fecm location by {len(self._table.gages)} gages of {self._table.name}>"

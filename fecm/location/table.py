@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fecm._errors import StudyError, warn
 from fecm._measured_tables import MeasuredTable, factor, read_table, same_name, unit_free, unit_in
+from fecm._record_faults import record_faults
 from fecm._text import printable
 from fecm._typing import Floats
 
@@ -34,6 +35,14 @@ class StrainTable(NamedTuple):
     time: Floats  # (points,), increasing
     gages: NDArray[np.int32]  # (gages,): numbers on the cards
     strains: Floats  # (gages, points)
+
+    def faults(self, clock: str) -> list[str]:
+        """Describe the faults of the records, for times in a unit, with causes and remedies."""
+        return [
+            f"{self.name}: {fault}"
+            for gage, strains in zip(self.gages.tolist(), self.strains, strict=True)
+            for fault in record_faults(f"gage {gage}", strains, self.time, clock=clock, ends=False)
+        ]
 
 
 def strain_table(

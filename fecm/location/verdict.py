@@ -11,7 +11,7 @@ tried: a gain of 1.3 changes the misfit little and may hide in the noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
@@ -339,13 +339,19 @@ def undescribed_gages(location: Location) -> list[int]:
     return [int(n) for n in location.gages[large & (neighbours > COLOURED * energies)]]
 
 
-def judged(location: Location, region: Region, wide: bool, cause: Cause | None) -> Location:
+def judged(
+    location: Location,
+    region: Region,
+    wide: bool,
+    cause: Cause | None,
+    faults: Sequence[str] = (),
+) -> Location:
     """Return the location with its notes and the verdict whether it is accepted.
 
     `wide` says whether narrower hats of the force would describe the strains better. `cause` says
-    what may be wrong with the strains.
+    what may be wrong with the strains. `faults` are those of their records.
     """
-    reasons = [*_reasons_to_reject(location, region)]
+    reasons = [*faults, *_reasons_to_reject(location, region)]
     if cause is not None:
         reasons.append(str(cause))
     return replace(location, notes=(*reasons, *_remarks(location, wide)), accepted=not reasons)

@@ -12,6 +12,7 @@ import numpy as np
 
 from fecm._errors import StudyError, warn
 from fecm._measured_tables import factor, read_table
+from fecm._record_faults import record_faults
 from fecm._text import printable
 from fecm._typing import Floats
 from fecm.results.stored import Stored
@@ -30,6 +31,7 @@ class Measurement:
     column: str  # what it is compared with: ``"force"`` or ``"transducer"``
     time: Floats  # (points,), increasing
     force: Floats  # (points,)
+    faults: tuple[str, ...] = ()  # of the instrument, with causes and remedies
 
     @property
     def quantity(self) -> str:
@@ -74,6 +76,8 @@ class Comparison:
         Pearson's coefficient; NaN if one of the forces is constant.
     units : dict of str
         Names of the units; empty if the deck names none.
+    doubts : tuple of str
+        Faults of the record, such as clipping, with causes and remedies.
     """
 
     points: int
@@ -86,6 +90,7 @@ class Comparison:
     rms: float
     correlation: float
     units: Mapping[str, str]
+    doubts: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         clock, pound = (self.units.get(name, "") for name in ("time", "force"))
@@ -143,7 +148,17 @@ def measurement_of(
         factor("the measurement", unit, units.get(dimension, ""), dimension)
         for unit, dimension in zip(stated, ("time", "force"), strict=False)
     ] or [1.0, 1.0]
-    return Measurement("measured", "force", time * factors[0], force * factors[1])
+    return _with_faults(
+        Measurement("measured", "force", time * factors[0], force * factors[1]), units
+    )
+
+
+def _with_faults(measured: Measurement, units: Mapping[str, str]) -> Measurement:
+    """Return a measurement with the faults of its record."""
+    faults = record_faults(
+        f"the {measured.quantity}", measured.force, measured.time, clock=units.get("time", "")
+    )
+    return replace(measured, faults=tuple(f"{measured.name}: {fault}" for fault in faults))
 
 
 def _is_text(value: object) -> bool:
@@ -157,7 +172,7 @@ def _from_file(
     column = "transducer" if table.has("transducer") and not table.has("force") else "force"
     columns_found = table.find(("time", column), columns, units)
     time, force = table.values(columns_found, units, stated=stated, increasing="time")
-    return Measurement(printable(path.name), column, time, force)
+    return _with_faults(Measurement(printable(path.name), column, time, force), units)
 
 
 def _doubt_trigger(stored: Stored, measured: Measurement, clock: Floats) -> None:
@@ -195,6 +210,8 @@ def compare_force(stored: Stored, measured: Measurement) -> Comparison:
     computed = np.append(0.0, stored.whole(f"history/{measured.column}"))
     interpolated = np.interp(time, clock, computed)
     _doubt_trigger(stored, measured, clock)
+    for fault in measured.faults:
+        warn(fault)
     weights = 0.5 * (np.diff(time, prepend=time[0]) + np.diff(time, append=time[-1]))
     varies = np.ptp(interpolated) > 0.0 and np.ptp(force) > 0.0
     return Comparison(
@@ -208,4 +225,5 @@ def compare_force(stored: Stored, measured: Measurement) -> Comparison:
         rms=float(np.sqrt(np.mean((interpolated - force) ** 2))),
         correlation=float(np.corrcoef(interpolated, force)[0, 1]) if varies else math.nan,
         units=stored.units,
+        doubts=measured.faults,
     )

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecm._errors import StudyError, warn
+from fecm._record_faults import record_faults
 from fecm._typing import Floats
 from fecm.authoring.contact import Contact
 from fecm.authoring.parameters import check_positive
@@ -98,8 +99,12 @@ class IndentationFit:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Reasons to doubt the law."""
-        return tuple(constants.fit_notes(self.fit))
+        """Reasons to doubt the law, from the fit and from the records."""
+        faults = (
+            *record_faults("the force", self.force),
+            *record_faults("the indentation", self.indentation),
+        )
+        return (*faults, *constants.fit_notes(self.fit))
 
     @property
     def law(self) -> Contact | None:
@@ -108,7 +113,8 @@ class IndentationFit:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, as printed by `fecm indent fit --format json`."""
-        return {"units": dict(self.units) or None, **constants.plain(self.fit)}
+        plain = constants.plain(self.fit) | {"notes": list(self.notes)}
+        return {"units": dict(self.units) or None, **plain}
 
     def __str__(self) -> str:
         units = tuple(self.units.values())
