@@ -17,7 +17,7 @@ from fecm._text import printable
 from fecm._typing import Floats
 from fecm.results.stored import Stored
 
-TRIGGER = 0.5  # time between two rises, over the time above half of the peak
+TRIGGER = 0.2  # time between two rises, over the time above half of the peak
 
 # A CSV file, or times and forces.
 Source = str | Path | tuple[Any, Any]
