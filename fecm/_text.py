@@ -7,7 +7,7 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from types import SimpleNamespace
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | None"
 
@@ -40,25 +40,33 @@ def jsonable(value: object) -> Json:
 FORMULA = re.compile(r"[=+@\x00-\x1f-]")  # how a formula of a spreadsheet begins
 
 
-def csv_lines(rows: Iterable[Iterable[object]]) -> Iterator[str]:
+Decimal = Literal["point", "comma"]  # decimal mark of a table
+DECIMALS: tuple[Decimal, ...] = ("point", "comma")
+
+
+def csv_lines(rows: Iterable[Iterable[object]], decimal: Decimal = "point") -> Iterator[str]:
     r"""Return the lines of a CSV table, with line ends.
 
     Numbers are written as Python's repr, which preserves every bit.  An apostrophe precedes texts
-    that a spreadsheet would read as formulas.
+    that a spreadsheet would read as formulas. With a decimal comma, semicolons separate the values.
 
     Examples
     --------
     >>> list(csv_lines([("time (s)", "force (N)"), (2e-07, 0.1)]))
     ['time (s),force (N)\n', '2e-07,0.1\n']
+    >>> list(csv_lines([("time (s)", "force (N)"), (2e-07, 0.1)], "comma"))
+    ['time (s);force (N)\n', '2e-07;0,1\n']
     """
     import csv  # only where a table is written
 
     echo: Any = SimpleNamespace(write=str)  # writerow returns what write returns
-    writer = csv.writer(echo, lineterminator="\n")
+    has_comma = decimal == "comma"
+    writer = csv.writer(echo, lineterminator="\n", delimiter=";" if has_comma else ",")
     for row in rows:
-        yield writer.writerow(
-            [f"'{v}" if isinstance(v, str) and FORMULA.match(v) else v for v in row]
-        )
+        values = [f"'{v}" if isinstance(v, str) and FORMULA.match(v) else v for v in row]
+        if has_comma:
+            values = [repr(v).replace(".", ",") if isinstance(v, float) else v for v in values]
+        yield writer.writerow(values)
 
 
 # Significant digits that are printed.  Errors of the model are some per cent; JSON and HDF5 keep

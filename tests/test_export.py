@@ -440,3 +440,24 @@ def test_without_pandas_the_message_says_what_to_install(
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match="pip install pandas"):
         result.to_dataframe()
+
+
+def test_a_table_with_decimal_commas_has_the_numbers_of_one_with_points(
+    file: Path, tmp_path: Path
+) -> None:
+    pointed = call("export", file, "--to", "csv", "-o", "-").stdout
+    comma = call("export", file, "--to", "csv", "-o", "-", "--decimal", "comma").stdout
+    assert comma != pointed
+    assert "." not in "".join(comma.splitlines()[1:])
+    again = "\n".join(
+        row.replace(",", ".").replace(";", ",") if number else row.replace(";", ",")
+        for number, row in enumerate(comma.splitlines())
+    )
+    assert again == pointed.rstrip("\n")
+    fecm.load(file).export(tmp_path / "h.csv", decimal="comma")
+    assert (tmp_path / "h.csv").read_text() == comma
+    sweep = fecm.sweep(small(), {"velocity": [50.5, 60.0]})
+    sweep.export(tmp_path / "s.csv", decimal="comma")
+    assert (tmp_path / "s.csv").read_text().splitlines()[1].startswith("0;50,5;")
+    waves = ("waves", "speeds", "--layup", "[0/90]s", "--material", "AS4/8552", "--step", "90")
+    assert call(*waves, "--decimal", "comma").stdout.splitlines()[1].startswith("0,0;")

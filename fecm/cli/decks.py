@@ -235,6 +235,8 @@ def _sarif(checked: Mapping[Path, Sequence[Finding]], failures: Sequence[str]) -
             "id": code,
             "helpUri": f"{HOME}/page/findings.html#{code.lower()}",
             "shortDescription": {"text": RULES[code].summary},
+            "fullDescription": {"text": f"{RULES[code].summary} {RULES[code].cause}".strip()},
+            "help": {"text": RULES[code].remedy, "markdown": RULES[code].remedy},
             "defaultConfiguration": {"level": severities[code]},
         }
         for code in codes

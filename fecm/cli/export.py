@@ -7,10 +7,11 @@ from pathlib import Path
 import click
 
 from fecm._files import check_outputs
+from fecm._text import Decimal
 from fecm.cli.common import DASH, RefusedError, echo, note
 from fecm.cli.isolation import reads
 from fecm.cli.options import DECK_PATH, FILE_PATH, NAMED_PATH, typical
-from fecm.cli.outputs import write_lines
+from fecm.cli.outputs import DECIMAL_OPTION, write_lines
 from fecm.listing.tapes import tape_texts, write_tapes
 from fecm.results import export as csv
 from fecm.results.export import ExportFormat
@@ -79,10 +80,16 @@ def tapes_command(result: Path, directory: Path, overwrite: bool) -> None:
     help="Content of csv: a dataset such as tape3/w, or a group.  [default: history; "
     "cases of a sweep]",
 )
+@DECIMAL_OPTION
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 @reads("result")
 def export_command(
-    result: Path, target: str, output: Path | None, dataset: str | None, overwrite: bool
+    result: Path,
+    target: str,
+    output: Path | None,
+    dataset: str | None,
+    decimal: Decimal,
+    overwrite: bool,
 ) -> None:
     """Write RESULT, of a run or of a sweep, in the format of another program.
 
@@ -104,15 +111,15 @@ def export_command(
         check_outputs([path], overwrite, [result])
     try:
         if is_sweep:
-            _write_sweep(contents, target, name, path, overwrite=overwrite)
+            _write_sweep(contents, target, name, path, decimal, overwrite=overwrite)
         elif path == DASH:
-            write_lines(
-                csv.dataset_csv_lines(result_of(contents), name, note), path, overwrite=overwrite
-            )
+            lines = csv.dataset_csv_lines(result_of(contents), name, note, decimal)
+            write_lines(lines, path, overwrite=overwrite)
         else:
             form = ExportFormat(target)
             asked = name if form is ExportFormat.CSV else ""
-            write(result_of(contents), path, form, asked, note, overwrite=overwrite)
+            run = result_of(contents)
+            write(run, path, form, asked, note, overwrite=overwrite, decimal=decimal)
     except ExportError as error:
         raise RefusedError(f"{result}: {error}") from None
     if path != DASH:
@@ -120,7 +127,13 @@ def export_command(
 
 
 def _write_sweep(
-    contents: FileContents, target: str, name: str, path: Path, *, overwrite: bool
+    contents: FileContents,
+    target: str,
+    name: str,
+    path: Path,
+    decimal: Decimal,
+    *,
+    overwrite: bool,
 ) -> None:
     """Write a table of a sweep."""
     if target != ExportFormat.CSV:
@@ -130,4 +143,4 @@ def _write_sweep(
     from fecm.sweeps.result import sweep_of
 
     cases = sweep_of(contents, history=name == "history")
-    write_lines(sweep_csv_lines(cases, name), path, overwrite=overwrite)
+    write_lines(sweep_csv_lines(cases, name, decimal), path, overwrite=overwrite)

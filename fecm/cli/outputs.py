@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from fecm._files import check_outputs, open_for_writing
-from fecm._text import csv_lines
+from fecm._text import DECIMALS, Decimal, csv_lines
 from fecm.cli.common import DASH, RefusedError, note
 from fecm.cli.options import FILE_PATH, NAMED_PATH, Decorated, stack_options
 from fecm.deck.units import column_name, unit_of
@@ -35,6 +35,13 @@ _PLOT = click.option(
     help="Also draw a picture: .png, .svg or .pdf.",
 )
 _OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
+DECIMAL_OPTION = click.option(
+    "--decimal",
+    type=click.Choice(DECIMALS),
+    default="point",
+    show_default=True,
+    help="Decimal mark of the CSV table; comma separates its values by semicolons.",
+)
 
 
 def outputs(source: str = "", *, table: bool = True) -> Callable[[Decorated], Decorated]:
@@ -46,11 +53,17 @@ def outputs(source: str = "", *, table: bool = True) -> Callable[[Decorated], De
     def decorate(function: Decorated) -> Decorated:
         @functools.wraps(function)
         def command(
-            picture: Path | None, overwrite: bool, output: Path = DASH, **values: Any
+            picture: Path | None,
+            overwrite: bool,
+            output: Path = DASH,
+            decimal: Decimal = "point",
+            **values: Any,
         ) -> None:
-            function(**values, targets=OutputPaths(output, picture, overwrite, values.get(source)))
+            targets = OutputPaths(output, picture, overwrite, values.get(source), decimal=decimal)
+            function(**values, targets=targets)
 
-        return stack_options(*([_OUTPUT] if table else []), _PLOT, _OVERWRITE)(command)
+        of_table = [_OUTPUT, DECIMAL_OPTION] if table else []
+        return stack_options(*of_table, _PLOT, _OVERWRITE)(command)
 
     return decorate
 
@@ -59,13 +72,19 @@ class OutputPaths:
     """Files of a table, ``-`` for standard output, and its picture, checked first."""
 
     def __init__(
-        self, table: Path, picture: Path | None, overwrite: bool, *sources: Path | None
+        self,
+        table: Path,
+        picture: Path | None,
+        overwrite: bool,
+        *sources: Path | None,
+        decimal: Decimal = "point",
     ) -> None:
         if picture is not None:
             if picture.suffix.lower() not in SUFFIXES:
                 raise RefusedError(f"{picture}: pictures are written as {', '.join(SUFFIXES)}")
             require_matplotlib()
         self.table, self.picture, self._overwrite = table, picture, overwrite
+        self._decimal = decimal
         files = [path for path in (table, picture) if path and path != DASH]
         check_outputs(files, overwrite, [source for source in sources if source])
 
@@ -89,7 +108,8 @@ class OutputPaths:
         header = [
             column_name(name, unit_of(dimension, units)) for name, dimension in columns.items()
         ]
-        write_lines(csv_lines(chain([header], rows)), self.table, overwrite=self._overwrite)
+        lines = csv_lines(chain([header], rows), self._decimal)
+        write_lines(lines, self.table, overwrite=self._overwrite)
         if self.table != DASH:
             note(f"wrote {self.table}")
 

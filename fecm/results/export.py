@@ -23,7 +23,7 @@ import h5py
 import numpy as np
 
 from fecm._files import check_outputs, open_for_writing
-from fecm._text import csv_lines
+from fecm._text import Decimal, csv_lines
 from fecm._typing import Array
 from fecm.deck.mesh_cards import AXES, DOF_NAMES
 from fecm.deck.units import column_name
@@ -73,7 +73,10 @@ BLOCK = 100_000  # lines per block
 
 
 def dataset_csv_lines(
-    result: Stored, name: str = HISTORY, note: Callable[[str], None] = lambda text: None
+    result: Stored,
+    name: str = HISTORY,
+    note: Callable[[str], None] = lambda text: None,
+    decimal: Decimal = "point",
 ) -> Iterator[str]:
     """Return the lines of one dataset such as ``tape3/w``, or of a group such as ``history``.
 
@@ -98,7 +101,8 @@ def dataset_csv_lines(
     instants = [result[path] for path in clock]
     if not values:  # only step or time
         header = _headings(result, clock)
-        return csv_lines([header, *zip(*(times.tolist() for times in instants), strict=True)])
+        rows = zip(*(times.tolist() for times in instants), strict=True)
+        return csv_lines([header, *rows], decimal)
     values = [path for path in values if path not in LABELS.values()] or values
     arrays = [result[path] for path in values]
     if plain == "plies" and len(values) > len(PLIES):
@@ -123,7 +127,7 @@ def dataset_csv_lines(
         path = LABELS.get(str(size), "")
         numbers.append(result[path].tolist() if path in result else range(1, length + 1))
     header = (*_headings(result, clock), *keys, *columns)
-    return csv_lines(itertools.chain([header], _rows(arrays, instants, numbers)))
+    return csv_lines(itertools.chain([header], _rows(arrays, instants, numbers)), decimal)
 
 
 def _members(result: Stored, name: str) -> list[str]:
@@ -405,6 +409,7 @@ def export_result(
     note: Callable[[str], None],
     *,
     overwrite: bool,
+    decimal: Decimal = "point",
 ) -> None:
     """Write a result; as CSV, one of its datasets or groups; see :meth:`fecm.Result.export`.
 
@@ -416,6 +421,6 @@ def export_result(
             raise ExportError("a dataset is chosen for csv; vtkhdf holds all fields")
         write_vtkhdf(result, path, note, overwrite=overwrite)
         return
-    lines = dataset_csv_lines(result, dataset or HISTORY, note)
+    lines = dataset_csv_lines(result, dataset or HISTORY, note, decimal)
     with open_for_writing(path, overwrite=overwrite) as file:
         file.writelines(lines)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from fecm._errors import ResultFileError, warn
 from fecm._table import Table, html_table
+from fecm._text import Decimal
 from fecm._typing import AnyFile, Floats
 from fecm.deck.model import Deck
 from fecm.results import schema
@@ -215,6 +216,7 @@ class Result(Stored, schema.ContactRows, MetricAttributes):
         *,
         to: Literal["vtkhdf", "csv"] | None = None,
         overwrite: bool = False,
+        decimal: Decimal = "point",
     ) -> None:
         """Write the result for ParaView or a spreadsheet, as ``fecm export`` does.
 
@@ -230,6 +232,8 @@ class Result(Stored, schema.ContactRows, MetricAttributes):
             ``"vtkhdf"`` or ``"csv"``; by default what the suffix of the file says.
         overwrite : bool
             Whether an existing file is replaced.
+        decimal : {"point", "comma"}
+            Decimal mark of csv. With commas, semicolons separate the values.
 
         Raises
         ------
@@ -248,7 +252,8 @@ class Result(Stored, schema.ContactRows, MetricAttributes):
         from fecm.results.export import export_result, format_of  # h5py takes 30 ms
 
         file = Path(path)
-        export_result(self, file, format_of(file, to), dataset, warn, overwrite=overwrite)
+        form = format_of(file, to)
+        export_result(self, file, form, dataset, warn, overwrite=overwrite, decimal=decimal)
 
     def plot(
         self,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fecm._errors import ResultFileError
-from fecm._text import csv_lines
+from fecm._text import Decimal, csv_lines
 from fecm._typing import Floats
 from fecm.authoring.cases import CONVERTED, MEASURED
 from fecm.authoring.values import dimension_of
@@ -234,7 +234,9 @@ CASES = "cases"
 HISTORY = "history"
 
 
-def sweep_csv_lines(sweep: StoredSweep, name: str = CASES) -> Iterator[str]:
+def sweep_csv_lines(
+    sweep: StoredSweep, name: str = CASES, decimal: Decimal = "point"
+) -> Iterator[str]:
     """Return the lines of a CSV table, with line ends.
 
     ``"cases"`` has the values and results of every case, ``"history"`` the contact force after
@@ -245,7 +247,7 @@ def sweep_csv_lines(sweep: StoredSweep, name: str = CASES) -> Iterator[str]:
         raise ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")
     if name == HISTORY and sweep.force is None:
         raise ExportError("the sweep has no stored forces; run it again with --history")
-    return csv_lines(_case_rows(sweep) if name == CASES else _step_rows(sweep))
+    return csv_lines(_case_rows(sweep) if name == CASES else _step_rows(sweep), decimal)
 
 
 def _case_rows(sweep: StoredSweep) -> Iterator[Iterable[Any]]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fecm._errors import ResultFileError
 from fecm._files import check_outputs, open_for_writing
 from fecm._table import Table, html_table
+from fecm._text import Decimal
 from fecm._typing import AnyFile
 from fecm.authoring.cases import MEASURED
 from fecm.deck.model import Delamination
@@ -214,6 +215,7 @@ class SweepResult(StoredSweep):
         table: Literal["cases", "history"] = "cases",
         *,
         overwrite: bool = False,
+        decimal: Decimal = "point",
     ) -> None:
         """Write the cases, or their contact forces, as CSV, as ``fecm export`` does.
 
@@ -225,6 +227,8 @@ class SweepResult(StoredSweep):
             A row per case, or a row per step of every case.
         overwrite : bool
             Whether an existing file is replaced.
+        decimal : {"point", "comma"}
+            Decimal mark. With commas, semicolons separate the values.
 
         Raises
         ------
@@ -242,7 +246,7 @@ class SweepResult(StoredSweep):
         """
         from fecm.sweeps.files import sweep_csv_lines  # 2 ms at start
 
-        lines = sweep_csv_lines(self, table)
+        lines = sweep_csv_lines(self, table, decimal)
         check_outputs([Path(path)], overwrite)
         with open_for_writing(Path(path), overwrite=overwrite) as file:
             file.writelines(lines)
