@@ -69,7 +69,7 @@ def start(folder: Path, what: str, patience: str) -> subprocess.Popen[str]:
     [
         (
             "crash",
-            "x.h5 can't be read: the HDF5 library crashed (SIGSEGV), as happens with damaged files",
+            "x.h5 can't be read: a library crashed (SIGSEGV), as happens with damaged files",
         ),
         (
             "hang",

@@ -1,4 +1,4 @@
-"""Isolation of commands that read result files: a child process under limits.
+"""Isolation of commands that read results or meshes: a child process under limits.
 
 HDF5 can crash on a damaged file or never return from it, which no exception handler catches. The
 program forks. The child runs the command under the kernel's limits of memory and processor time,
@@ -60,19 +60,21 @@ def limits_for(sizes: list[int], free: int | None) -> tuple[int, float]:
 def reads(*names: str) -> Callable[[Command], Command]:
     """Run a command in a child process.
 
-    `names` are the parameters with the files to read: a path, or a tuple of paths.
+    `names` are the parameters with the files to read: a path, or a tuple of paths. Without a path
+    the command runs in this process.
     """
 
     def decorate(function: Command) -> Command:
         @functools.wraps(function)
         def command(**values: Any) -> None:
-            if not (enabled and sys.platform == "linux"):
-                function(**values)
-                return
             inputs = (values[name] for name in names)
-            files = [
+            given = [
                 f for value in inputs for f in (value if isinstance(value, tuple) else [value])
             ]
+            files = [file for file in given if isinstance(file, Path)]
+            if not (files and enabled and sys.platform == "linux"):
+                function(**values)
+                return
             memory, seconds = limits_for(list(map(_size, files)), available_memory())
             label = printable(" or ".join(map(str, dict.fromkeys(files))))
             sys.stdout.flush()
@@ -147,6 +149,6 @@ def _wait(child: int, label: str, seconds: float, folders: Iterable[Path]) -> No
         -signal.SIGKILL: "the reading process was killed, as the system does when memory runs out",
     }.get(
         status,
-        f"the HDF5 library crashed ({signal.Signals(-status).name}), as happens with damaged files",
+        f"a library crashed ({signal.Signals(-status).name}), as happens with damaged files",
     )
     raise RefusedError(f"{label} can't be read: {reason}")

@@ -30,6 +30,7 @@ from fecm.authoring.plate import CUSTOM, FIXTURES, Plate, Support
 from fecm.authoring.zones import Zone
 from fecm.cli import new_values
 from fecm.cli.common import DASH, RefusedError, echo, note, write_text
+from fecm.cli.isolation import reads
 from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options, unique
 from fecm.cli.options import (
     FILE_PATH,
@@ -376,6 +377,7 @@ class NewOptions:
     "strengths.  [default with --damage: as --every]",
 )
 @option("--overwrite", is_flag=True, help="Replace an existing deck.")
+@reads("mesh")
 @collected(NewOptions)
 def new_command(options: NewOptions) -> None:
     """Write a deck that is ready to run from plate, layup, supports and impact.
