@@ -392,6 +392,7 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
         + DATA_CARDS.replace("    2  90.     0.053", "    2  90.     0.053    2"),
     ),
     "W461": plate(replaced(r"^(.{5}).{5}(     0\.184)$", r"\1 45.0\2")),
+    "N589": plate(replaced(r"^(   1[45]).{5}(     0\.184)$", r"\1 45.0\2")),
     "W462": plate(with_card("CURE", "-600.,", ",.02E-6,22.5E-6", "")),
     "W540": plate(with_card("CURE", "155.,", ",.02E-6,22.5E-6", "")),
     "W541": lambda: small(

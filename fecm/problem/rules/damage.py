@@ -56,6 +56,7 @@ USUAL_TOUGHNESS = 700.0
 LOWEST_RELATIVE = 1e-7
 HIGHEST_RELATIVE = 5e-3
 ENOUGH_EVALUATIONS = 20  # evaluations of FAIL that do not miss the largest exposure over time
+CLUSTER = 3  # like plies at the far face that crack before the threshold
 MOST_TWIST = 0.1  # largest |D16| and |D26|, over (D11 D22)^(1/2), without a warning of DELA
 
 
@@ -429,6 +430,32 @@ def limited_slope(problem: Problem) -> Reports:
         yield Report(message, card.place(), "check YT and S12")
 
 
+@rule("N589", Subject.DAMAGE)
+def cluster_at_far_face(problem: Problem) -> Reports:
+    """Three or more like plies lie together at the face away from the impact.
+
+    Bending cracks them early, and the crack opens their interface: tests of such laminates had
+    damage from half the energy of the delamination threshold.
+
+    Remedy: Quote the lowest criterion of FAIL beside the threshold.
+    """
+    deck = problem.deck
+    judges = deck.has(model.Delamination) or deck.has(model.Allowables)
+    layers = list(deck.layers.values())[problem.laminate_number]
+    last, count = layers[-1], 0
+    for layer in reversed(layers):
+        if (layer.angle, layer.material) != (last.angle, last.material):
+            break
+        count += 1
+    if judges and CLUSTER <= count < len(layers):
+        message = (
+            f"{count} like plies lie together at the far face: they crack in bending, and their "
+            "interface opens, before the threshold of DELA."
+        )
+        hint = "quote the lowest exposure of FAIL beside the threshold"
+        yield Report(message, last.place("fibre angle"), hint)
+
+
 @reports("E497")
 def strengths_of_missing_material(deck: model.Deck) -> Reports:
     """Find materials of ALLO that the deck does not have."""
@@ -473,6 +500,7 @@ OF_THRESHOLD = (coupled_threshold, twisted_threshold)
 # One of these is enough.
 STRENGTHS = (strengths_in_another_unit, strengths_in_another_order, weak_in_shear)
 VALUES = (
+    cluster_at_far_face,
     threshold_of_a_sandwich,
     strengths_without_criteria,
     puck_of_a_fabric,
