@@ -33,6 +33,7 @@ Row = tuple[int, list[str]]  # number of the line, and its fields
 LINE_BYTES = 400
 FIELD_BYTES = 80
 COPIES = 4
+LISTING = 80  # characters of the names of columns in a message
 SAMPLE = 200  # lines that tell the separator
 
 # Units that tables may name: in m, N, s, V and m/m, with u for micro.  The pound-force is
@@ -210,7 +211,9 @@ class MeasuredTable(NamedTuple):
             places = matching if len(matching) == 1 else convertible[: distinct and not matching]
         if places:
             return places[0]
-        listing = ", ".join(self.head[1])[:80] or "unnamed"
+        listing = ", ".join(self.head[1]) or "unnamed"
+        if len(listing) > LISTING:
+            listing = f"{listing[:LISTING].rpartition(', ')[0] or listing[:LISTING]}, ..."
         alternatives = f" (or {', '.join(words[1:])})" if words[1:] else ""
         raise StudyError(
             f"{self.path}: the columns are {listing}; one must be named {words[0]}{alternatives}; "

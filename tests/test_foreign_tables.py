@@ -477,6 +477,14 @@ def test_a_table_of_cases_takes_units_in_every_notation(tmp_path: Path) -> None:
         assert read_cases(path, "mm-N-s") == [{"energy": 1000.0, "velocity": 2000.0}]
 
 
+def test_a_list_of_columns_is_cut_between_names(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    names = [f"channel number {n}" for n in range(12)]
+    path.write_text("\n".join([",".join(names), *[",".join("1" * 12)] * 3]))
+    with pytest.raises(StudyError, match=r"channel number 3, \.\.\.; one must be named time"):
+        measurement_of(path, DECK)
+
+
 def test_a_clock_of_too_few_digits_is_told_with_its_mean_step(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     rows = "".join(f"{3.3e-7 * n:.6f},{n}\n" for n in range(30))
