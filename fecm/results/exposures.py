@@ -21,7 +21,7 @@ from fecm.results.criteria import (
     plies_in_words,
     where,
 )
-from fecm.results.exposure_bands import LoadMesh, mesh_band
+from fecm.results.exposure_bands import LoadMesh, may_decide_otherwise, mesh_band
 from fecm.results.stored import Stored, computed_once
 
 LOWER_BOUNDS = "the run ends in contact: exposures are lower bounds"
@@ -66,7 +66,7 @@ class LargestExposure(NamedTuple):
     @property
     def is_open(self) -> bool:
         """Whether finer meshes may decide otherwise whether the exposure reaches 1."""
-        return self.band is not None and self.band[0] < 1.0 <= self.band[1]
+        return self.band is not None and may_decide_otherwise(self.exposure, self.band)
 
 
 class FailureVerdict(StrEnum):
