@@ -157,6 +157,8 @@ def test_findings_as_sarif_are_valid_and_have_their_place(folder: Path) -> None:
     page = (ROOT / "docs" / "findings.md").read_text()
     for rule in run["tool"]["driver"]["rules"]:
         assert f"{{#{rule['helpUri'].partition('#')[2]}}}" in page
+        assert rule["fullDescription"]["text"].startswith(rule["shortDescription"]["text"])
+        assert rule["help"]["text"]
     broken = call("check", "sound.inp", "/dev/null", "--format", "sarif")
     Draft202012Validator(schema).validate(json.loads(broken.stdout))
     assert_unusable(call("check", "sound.inp", "--mesh-error", "--format", "sarif"))

@@ -203,6 +203,10 @@ def write_vtkhdf(
     """
     if "tape3/displacement" not in result:
         lack = "the result has no displacements (tape3), so there is no time step to export"
+        if any(path.startswith("modes/") for path in result):
+            raise ExportError(
+                f"{lack}; natural modes are exported as csv, with the dataset modes/shape"
+            )
         raise ExportError(f"{lack}{remedy('tape3')}")
     # A state stored twice is one time step.
     steps, rows = np.unique(result["tape3/step"], return_index=True)
