@@ -485,7 +485,6 @@ PLATE = fecm.Plate.rectangle(SIDES, (4, 4))
     [
         ({"energy": 1.0}, "give either `velocity` or `energy`"),
         ({"velocity": None}, "give either `velocity` or `energy`"),
-        ({"duration": None}, "`duration` is missing"),
         ({"duration": -1.0}, "`duration` is -1.0; it must be a positive number"),
         ({"units": "cubits"}, "`units`: 'cubits' is not a system of units"),
         ({"units": ["mm", "N", "s"]}, "`units` is .*, not a text such as 'mm-N-s'"),

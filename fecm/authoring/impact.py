@@ -249,9 +249,10 @@ def impact(
         Impact point; the middle of the plate by default. The projectile hits the nearest node. On
         an imported mesh the patch is centred at the point itself.
     duration : float or str
-        Simulated time; a text may have a unit, ``"4ms"``. On a fixture it is optional. The default
-        is then 1.25 half periods of the projectile on the plate, or 1.1 times the duration of the
-        contact with the indentation if that is longer.
+        Simulated time; a text may have a unit, ``"4ms"``. By default the steps end once the impact
+        is over (``OVER``), after at most 4 times the expected time: 1.25 half periods of the
+        projectile on the plate, or 1.1 times the duration of the contact with the indentation if
+        that is longer.
     dt : float, optional
         Time step; 0.9 of the critical time step by default.
     every : int, optional
@@ -583,7 +584,7 @@ def _doubt_of_thickness(name: str, test: DropWeight, thickness: float) -> str:
 def _check_complete(
     request: Request, strike: ImpactParameters, motion: Motion, system: str | None
 ) -> None:
-    """Raise ObjectError if projectile, velocity or duration is missing."""
+    """Raise ObjectError if projectile or velocity is missing."""
     if strike.projectile is None and system not in (None, SYSTEM):
         raise ObjectError(
             "give `projectile`, a rigid mass or a rod: without it the projectile is the report's "
@@ -591,8 +592,6 @@ def _check_complete(
         )
     if (motion.velocity is None) == (motion.energy is None):
         raise ObjectError("give either `velocity` or `energy`")
-    if motion.duration is None and request.plate.fixture is None:
-        raise ObjectError("`duration` is missing")
 
 
 def _unit_segment(request: Request, plies: DeckPlies) -> model.Units | None:

@@ -10,7 +10,14 @@ from typing import Literal, NamedTuple
 from fecm.authoring.contact import parse_patch
 from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck import model
-from fecm.deck.macros import Rows, RowsOfPlies, steps_of_plies, with_outputs
+from fecm.deck.macros import (
+    EXTENDED,
+    TESTS,
+    Rows,
+    RowsOfPlies,
+    steps_of_plies,
+    with_outputs,
+)
 from fecm.deck.model import Allowables, Deck, Macro, Patch, Shear
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.points import HERTZ
@@ -83,11 +90,18 @@ class Numerics(NamedTuple):
             raise
 
     def program(
-        self, deck: Deck, dt: float, duration: float, elements: int | None = None
+        self,
+        deck: Deck,
+        dt: float,
+        duration: float,
+        elements: int | None = None,
+        *,
+        until_over: bool = False,
     ) -> tuple[Macro, ...]:
         """Return the macro program of an impact.
 
         By default it stores ply stresses in `elements` elements; None stores no ply stresses.
+        `until_over` ends it once the impact is over, after at most EXTENDED times the duration.
         """
         steps = max(1, math.ceil(duration / dt - 1e-9))
         rows = self.every if self.every is not None else max(1, steps // ROWS)
@@ -98,15 +112,19 @@ class Numerics(NamedTuple):
         plies = self.plies
         if plies is None and elements is not None:
             plies = (steps_of_plies(steps, rows), elements)
-        return with_outputs(macros, failure=failure, plies=plies)
+        macros = list(with_outputs(macros, failure=failure, plies=plies))
+        if until_over:
+            macros[2] = Macro("LOOP", value=float(EXTENDED * steps))
+            macros.insert(-1, Macro("OVER", value=float(max(1, steps // TESTS))))
+        return tuple(macros)
 
     def with_program(self, deck: Deck, dt: float, duration: float | None) -> Deck:
-        """Return the deck with its program. The default duration covers the contact.
+        """Return the deck with its program. By default it ends once the impact is over.
 
         With `damage` and strengths the program also stores ply stresses around the load.
         """
         with_plies = self.damage and deck.has(Allowables)
-        elements = None
+        elements, until_over = None, duration is None
         if duration is None or with_plies:
             loaded = load_deck(replace(deck, macros=self.program(deck, dt, dt)))
             if loaded.errors():  # the deck is refused later
@@ -114,7 +132,8 @@ class Numerics(NamedTuple):
             (problem,) = loaded.problems
             duration = contact_duration(problem) if duration is None else duration
             elements = elements_around_load(problem) if with_plies else None
-        return replace(deck, macros=self.program(deck, dt, duration, elements))
+        macros = self.program(deck, dt, duration, elements, until_over=until_over)
+        return replace(deck, macros=macros)
 
 
 def elements_around_load(problem: Problem) -> int:

@@ -17,7 +17,7 @@ from fecm.problem.check import check_program
 from fecm.problem.problem import Problem
 
 LONGEST_LOOP = 1e15  # passes; the checks reject much shorter programs already
-STORING = ("RODP", "DISP", "STRE", "PLYS")  # macros that store every N-th step or pass
+EVERY_NTH = ("RODP", "DISP", "STRE", "PLYS", "OVER")  # macros that act at every N-th step or pass
 
 
 class Clock(NamedTuple):
@@ -140,9 +140,12 @@ def _adjust_macro(visit: _Visit, dt: float | None, ratios: dict[int, float]) -> 
     if macro.word == "LOOP" and visit.place in ratios:
         count = min(max(1.0, macro.value) * ratios[visit.place], LONGEST_LOOP)
         return replace(macro, value=float(max(1, math.ceil(count - 1e-9))), source=None)
-    if macro.word in STORING and visit.loop in ratios:
-        count = min(every(macro) * ratios[visit.loop], LONGEST_LOOP)
-        return replace(macro, value=float(max(1, round(count))), source=None)
+    if macro.word in EVERY_NTH and visit.loop in ratios:
+        ratio = ratios[visit.loop]
+        count = min(every(macro) * ratio, LONGEST_LOOP)
+        changed = replace(macro, value=float(max(1, round(count))), source=None)
+        first = float(math.ceil(min(macro.second * ratio, LONGEST_LOOP)))
+        return replace(changed, second=first) if macro.word == "OVER" else changed
     return macro
 
 

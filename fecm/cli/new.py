@@ -354,8 +354,8 @@ class NewOptions:
 @option(
     "--duration",
     metavar="T[UNIT]",
-    help="Simulated time, also with a unit, as in 4ms.  [default with --fixture: longer than "
-    "the contact of the projectile with the static plate]",
+    help="Simulated time, also with a unit, as in 4ms.  [default: until the impact is over (OVER), "
+    "at most 4 times the expected time]",
 )
 @option("--dt", type=POSITIVE, help="Time step.  [default: 0.9 of the critical one]")
 @option(

@@ -191,6 +191,14 @@ WORDS = {
             MacroNumber.EVERY,
             rows=StoredRows.EVERY_NTH_PASS,
         ),
+        Word(
+            "OVER",
+            "Leaves the loop at an N-th pass, from the M-th on, once the impact is over.",
+            MacroNumber.EVERY,
+            needs=(("RODP",),),
+            inside=True,
+            second=True,
+        ),
         Word("CHEC", "Reports mesh and storage."),
     )
 }
@@ -349,18 +357,42 @@ def hits(body: Body) -> bool:
     return any(macro.word == "RODP" for macro in flat(body))
 
 
+EXTENDED = 4  # largest number of passes of an extended loop, over its own
+TESTS = 200  # tests of OVER in as many passes as the loop had
+
+
+def extended(body: Body) -> Body:
+    """Return a program whose loops of impact steps go on until the impact is over.
+
+    They make at least their own number of passes, and at most EXTENDED times as many. Loops within
+    loops stay as they are.
+    """
+    return tuple(_extended(item) if isinstance(item, Loop) else item for item in body)
+
+
+def _extended(loop: Loop) -> Loop:
+    words = [item.word for item in loop.body if isinstance(item, Macro)]
+    if "RODP" not in words:
+        return loop
+    body = loop.body
+    if "OVER" not in words:
+        body += (Macro("OVER", value=max(1.0, loop.count // TESTS), second=float(loop.count)),)
+    return replace(loop, count=EXTENDED * loop.count, body=body)
+
+
 def moves_only(body: Body) -> bool:
     """Return whether a program has no static solution, so that the plate moves from rest."""
     return all(macro.word not in ("TANG", "FORM", "SOLV") for macro in flat(body))
 
 
 class WorkEstimate(NamedTuple):
-    """Work and output of a program; upper bounds if CONV may leave loops early."""
+    """Work and output of a program; upper bounds if CONV or OVER may leave loops early."""
 
     macros: int  # executed macros; each pass of a loop executes its NEXT
     steps: int  # time steps, impact steps and central differences
     contact_rows: int  # steps that store contact and strains
     passes: Counter[str]  # rows by the word that stores them, see `StoredRows`
+    at_most: bool = False  # whether OVER may end the steps earlier
 
 
 def estimate_work(body: Body) -> WorkEstimate:
@@ -386,7 +418,7 @@ def estimate_work(body: Body) -> WorkEstimate:
         contact = total // next(iter(steps))
     else:
         contact = sum(min(count, total // n) for n, count in impact.items())
-    return WorkEstimate(macros, total, contact, passes)
+    return WorkEstimate(macros, total, contact, passes, any(m.word == "OVER" for m in flat(body)))
 
 
 def _executed(body: Body, count: int = 1, outer: int = 1) -> Iterator[tuple[Macro, int, int]]:
@@ -527,7 +559,10 @@ def _with_output(macros: Sequence[Macro], output: _Output) -> list[Macro]:
         elif macro.word == "NEXT" and loops:
             passes = loops.pop()
             if depth in stepping:
-                changed.append(output.create(passes, step))
+                place = len(changed)
+                if changed[-1].word == "OVER":  # which is the last macro, and ends most loops early
+                    place, passes = place - 1, max(1, passes // EXTENDED)
+                changed.insert(place, output.create(passes, step))
             stepping.discard(depth)
         changed.append(macro)
     if len(changed) == len(macros):

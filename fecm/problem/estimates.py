@@ -16,6 +16,7 @@ from fecm._errors import FecmError
 from fecm._typing import Indices
 from fecm.deck import model
 from fecm.deck.model import Impact
+from fecm.mechanics.laminate import effective_rigidity
 from fecm.mechanics.mesh import longest_sides
 from fecm.mechanics.quick_models import (
     StaticCurve,
@@ -222,7 +223,9 @@ def whole_stiffness(problem: Problem) -> float:
 def contact_duration(problem: Problem) -> float:
     """Return a simulated time that is longer than the contact with the static plate.
 
-    A nonlinear plate has its static curve if there is one, and is taken as linear otherwise.
+    A nonlinear plate has its static curve if there is one, and is taken as linear otherwise. A
+    plate that nothing holds bends under its own inertia, here as softly as a beam of its longer
+    side under half a sine: half a period of that bending, with the reduced mass.
     """
     mass, velocity, k = problem.projectile_mass, _velocity(problem), problem.contact_coefficient
     if problem.plate.nonlinear and velocity > 0.0:
@@ -232,6 +235,11 @@ def contact_duration(problem: Problem) -> float:
             whole = contact_time_on_curve(mass, velocity, k, curve)
             return _rounded(max(HALF_PERIODS * bare, CONTACT_TIMES * whole))
     stiffness = whole_stiffness(problem)
+    if math.isnan(stiffness):
+        side = float(np.ptp(problem.mesh.coordinates[:, :2], axis=0).max())
+        bending = effective_rigidity(problem.laminate) * math.pi**4 / (4.0 * side**2)
+        plate = problem.plate_mass
+        return _rounded(math.pi * math.sqrt(mass * plate / (mass + plate) / bending))
     duration = HALF_PERIODS * math.pi * math.sqrt(mass / stiffness)
     if velocity > 0.0:
         with suppress(OverflowError):  # the checks doubt such a k

@@ -424,6 +424,7 @@ class Problem:
             self.laminate.thickness,
             in_plane_of(self.mesh.codes, self.mesh.coordinates, self.symmetry.cut),
             mobility,
+            plate_mass=self.moving_plate.total_mass(),
             preloaded=self.plate.is_preloaded,
             curved=self.plate.is_curved,
             nonlinear=self.plate.nonlinear,

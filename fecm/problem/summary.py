@@ -119,6 +119,8 @@ class ProblemSummary:
         Every DT of the program; 0 takes 0.9 of the critical time step.
     output_bytes : int
         Approximate size of the result.
+    at_most : bool
+        Whether OVER may end the program earlier, so that steps and bytes are upper bounds.
     elements_per_wave : float or None
         Elements at the impact node per bending wave of the contact; None without impact.
     mesh_error : float or None
@@ -168,6 +170,7 @@ class ProblemSummary:
     elements_per_buckle: float | None
     time_steps: tuple[FiniteFloat, ...]
     output_bytes: int
+    at_most: bool
     elements_per_wave: FiniteFloat | None
     mesh_error: FiniteFloat | None
     equilibrium_change: FiniteFloat | None
@@ -293,8 +296,9 @@ def _program_rows(summary: ProblemSummary) -> Iterator[Row]:
     if summary.elements_per_wave is not None:
         error = "" if summary.mesh_error is None else f" ({format_mesh_error(summary.mesh_error)})"
         yield ("elements per wave", f"{summary.elements_per_wave:.1f}{error}")
-    yield ("impact steps", str(summary.steps))
-    yield ("output", format_bytes(summary.output_bytes))
+    at_most = "at most " if summary.at_most else ""
+    yield ("impact steps", f"{at_most}{summary.steps}")
+    yield ("output", f"{at_most}{format_bytes(summary.output_bytes)}")
 
 
 def _effect_of_equilibrium(summary: ProblemSummary) -> str:
@@ -341,6 +345,7 @@ def deck_summary(problem: Problem) -> ProblemSummary:
         elements_per_buckle=problem.elements_per_buckle if plate.is_curved else None,
         time_steps=tuple(macro.value for macro in flat(problem.program) if macro.word == "DT"),
         output_bytes=problem.output_bytes,
+        at_most=problem.work.at_most,
         elements_per_wave=None if resolved is None else resolved.elements,
         mesh_error=None if resolved is None else resolved.error,
         equilibrium_change=equilibrium_change(problem) if without_equilibrium else None,

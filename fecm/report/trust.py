@@ -54,6 +54,11 @@ SLOPES = "membrane/largest_slope"  # of a nonlinear plate, at the stored rows
 SO_FAR = "so far: the run ends before its peak"
 ENDS = {
     End.OVER: (TrustLevel.WITHIN, "contact over", ""),
+    End.APART: (
+        TrustLevel.DOUBTFUL,
+        "peak passed, may touch again",
+        "what another contact changes is open: rebound, energies, permanent indentation",
+    ),
     End.PASSED: (
         TrustLevel.DOUBTFUL,
         "in contact, peak passed",

@@ -7,6 +7,7 @@ from fecm.results.criteria import is_isotropic as is_isotropic
 from fecm.results.end import Deflection as Deflection
 from fecm.results.end import End as End
 from fecm.results.end import LastContact as LastContact
+from fecm.results.end import RigidMotion as RigidMotion
 from fecm.results.end import decided as decided
 from fecm.results.end import ends as ends
 from fecm.results.end import settled_deflection as settled_deflection

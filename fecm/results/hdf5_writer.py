@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
@@ -29,6 +30,7 @@ SCALAR = h5py.h5s.create(h5py.h5s.SCALAR)
 # Of datasets without time stamps.
 PROPERTIES = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
 PROPERTIES.set_obj_track_times(False)
+CHUNK = 65_536  # bytes of the chunks of datasets that grow
 
 
 class FileSink:
@@ -77,23 +79,31 @@ class FileSink:
             else:
                 target.attrs[name] = value
 
-    def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
-        """Create a contiguous dataset of its full shape; see :meth:`known`."""
+    def create(self, dataset: Dataset, shape: tuple[int, ...], *, grows: bool = False) -> None:
+        """Create a dataset of its full shape; see :meth:`known`.
+
+        It is contiguous, unless it grows: then the file has no room for rows that never come.
+        """
         self.known(dataset.path, len(shape))
-        self._create(dataset, shape)
+        self._create(dataset, shape, grows=grows)
 
     def known(self, path: str, rank: int) -> Dataset:
         """Return the dataset of the schema; ValueError if the schema has none of this path."""
         return schema.required_dataset(path, rank, self._form)
 
-    def _create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
-        self._note(Operation.CREATE, path=dataset.path, shape=shape)
+    def _create(self, dataset: Dataset, shape: tuple[int, ...], *, grows: bool = False) -> None:
+        self._note(Operation.CREATE, path=dataset.path, shape=shape, grows=grows)
         # Low-level interface: create_dataset takes twice as long.
-        place = h5py.h5s.create_simple(shape)
+        place = h5py.h5s.create_simple(shape, shape if grows else None)
         kind = _type_of(dataset.dtype)
         name = dataset.name.encode()
         group = self._group(dataset.group).id
-        created = h5py.Dataset(h5py.h5d.create(group, name, kind, place, PROPERTIES))
+        properties = PROPERTIES
+        if grows:
+            rows = max(1, CHUNK // (kind.get_size() * max(1, math.prod(shape[1:]))))
+            properties = PROPERTIES.copy()
+            properties.set_chunk((min(rows, shape[0]), *shape[1:]))
+        created = h5py.Dataset(h5py.h5d.create(group, name, kind, place, properties))
         _set_text(created, dataset.description, "description", "long_name")
         if dataset.dimension:
             _set_text(created, dataset.dimension, "dimension")
@@ -178,7 +188,11 @@ class FileSink:
 
     def trim(self, path: str, rows: int) -> None:
         """Truncate a dataset to its first rows; delete it, or an empty group, without rows."""
-        old = self.arrays.pop(path)
+        old = self.arrays[path]
+        if rows and old.chunks is not None:
+            old.resize(rows, axis=0)
+            return
+        del self.arrays[path]
         group = old.parent
         attributes = dict(old.attrs)
         kept = old[:rows]

@@ -9,7 +9,7 @@ import numpy as np
 from fecm._typing import Bools, Floats
 from fecm.results.criteria import ALL_CRITERIA, spelt
 from fecm.results.end import (
-    CLEAR,
+    GONE,
     Deflection,
     LastContact,
     Texts,
@@ -162,7 +162,9 @@ def described(name: str) -> str:
     return COLUMNS[name].description if name in COLUMNS else "measured by the caller"
 
 
-MOBILITY = "rigid_mobility"  # attribute of a run whose plate is not held; see `Judge`
+# Attributes of the history of a run: the mass of its plate, and the mobility of a plate that is not
+# held; see `Judge`.
+PLATE_MASS, MOBILITY = "plate_mass", "rigid_mobility"
 # Attributes of a run whose plate is deflected when the impact starts. Those of the history are
 # displacements under the load: where the projectile starts, and where the nodal forces hold the
 # plate during the impact, if they do. That of the energy is the plate's part of the initial energy.
@@ -214,17 +216,19 @@ def impact_metrics(
     threshold: float | Floats | None = None,
     mobility: float = 0.0,
     factor: int = 1,
+    plate_mass: float = np.nan,
 ) -> Metrics:
     """Summarise many cases from their contact forces.
 
     Contact forces are (steps, cases), times of the steps (steps,). Returns the names of
     :data:`SUMMARY`; with a delamination threshold (force, or (cases,)) also the names of
     :data:`THRESHOLD`. `plate` is the motion of the plate under the load, `mobility` (1/mass) the
-    mobility of its rigid motion; see :class:`~fecm.results.validity.Judge`. Values that the end of
-    a case has not decided are NaN. Forces, masses and energies are those of one of `factor`
-    symmetric parts; the threshold, and the forces and energies returned, are those of the whole
-    plate. If a case ends in contact, only the peaks can be decided, and
-    only if they have passed and the projectile leaves.
+    mobility of its rigid motion, and `plate_mass` its mass; see
+    :class:`~fecm.results.validity.Judge`. Values that the end of a case has not decided are NaN.
+    Forces, masses and energies are those of one of `factor` symmetric parts; the threshold, and
+    the forces and energies returned, are those of the whole plate. If a case ends in contact or
+    within reach of the plate, only the peaks can be decided, and only if they have passed and the
+    projectile leaves.
     """
     limit = None if threshold is None else np.broadcast_to(threshold, force.shape[1])
     of_forces = _from_forces(force, times, None if limit is None else limit / factor)
@@ -232,17 +236,15 @@ def impact_metrics(
     impulse, reached, met = of_forces.impulse, of_forces.reached, of_forces.met
     rebound = impulse / mass - velocity
     leaving = rebound + mobility * impulse
-    # The velocity of the rigid motion belongs to both.
-    plate = plate._replace(speed=np.maximum(plate.speed - mobility * impulse, 0.0))
-    is_slow = leaving <= CLEAR * plate.speed
-    before, contact_peak = _present_contact(force, of_forces.last)
+    # What is still near may be reached by the plate.
+    is_apart = (of_forces.last <= 0.0) & (leaving <= GONE * plate.speed)
     last = LastContact(
         of_forces.last,
-        before,
         reached,
-        contact_peak,
-        leaving=leaving,
-        position=_position(force, times, mass, velocity, (of_forces.last <= 0.0) & is_slow),
+        _present_peak(force, of_forces.last),
+        leaving,
+        _position(force, times, mass, velocity, is_apart, mobility),
+        mass / plate_mass,
     )
     end = ends(last, plate, is_held=mobility == 0.0)
     finished, peak_is_known = over(end), peak_known(end)
@@ -278,31 +280,34 @@ def impact_metrics(
     return Metrics(columns, end, reached, last, plate, is_held=mobility == 0.0)
 
 
-def _present_contact(force: Floats, last: Floats) -> tuple[Floats, Floats]:
-    """Return the force before the last step, and the largest force of the last contact.
-
-    Both are (cases,), and 0 where the case does not end in contact.
-    """
-    before, peak = np.zeros_like(last), np.zeros_like(last)
+def _present_peak(force: Floats, last: Floats) -> Floats:
+    """Return the largest force of the last contact, (cases,); 0 after a contact."""
+    peak = np.zeros_like(last)
     for case in np.flatnonzero(last > 0.0):
         history = force[:, case]
         gaps = np.flatnonzero(history <= 0.0)
-        contact = history[gaps[-1] + 1 if len(gaps) else 0 :]
-        before[case] = contact[-2] if len(contact) > 1 else 0.0
-        peak[case] = contact.max()
-    return before, peak
+        peak[case] = history[gaps[-1] + 1 if len(gaps) else 0 :].max()
+    return peak
 
 
 def _position(
-    force: Floats, times: Floats, mass: Floats, velocity: Floats, chosen: Bools
+    force: Floats,
+    times: Floats,
+    mass: Floats,
+    velocity: Floats,
+    chosen: Bools,
+    mobility: float,
 ) -> Floats:
-    """Return the displacement of the projectiles at the end, (cases,), NaN where not chosen."""
+    """Return the displacement of the projectiles at the end, (cases,), NaN where not chosen.
+
+    It is relative to the rigid motion of a plate with a mobility (1/mass).
+    """
     position = np.full(len(chosen), np.nan)
     dt = np.diff(times, prepend=0.0)
     lever = 0.5 * (dt + np.append(dt[1:], 0.0)) * (times[-1] - times)
     for case in np.flatnonzero(chosen):
         push = float((lever * force[:, case]).sum())
-        position[case] = velocity[case] * times[-1] - push / mass[case]
+        position[case] = velocity[case] * times[-1] - push * (1.0 / mass[case] + mobility)
     return position
 
 

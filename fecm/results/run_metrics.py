@@ -13,13 +13,14 @@ from fecm._errors import ResultFileError
 from fecm._table import Row, Table, html_table, text_lines
 from fecm.deck.model import Impact
 from fecm.deck.units import quantity, unit_of
-from fecm.results.end import Deflection, End, time_to_decide
+from fecm.results.end import Deflection, End, RigidMotion, time_to_decide
 from fecm.results.groups import NotStoredError, remedy, suggestion
 from fecm.results.metrics import (
     INITIAL_PLATE,
     INTEGERS,
     METRICS,
     MOBILITY,
+    PLATE_MASS,
     REST_W,
     START_W,
     IndentationMetrics,
@@ -177,6 +178,7 @@ def _summarised(stored: Stored) -> Metrics | None:
             threshold=_number(stored.threshold.get("force")) if stored.threshold else None,
             mobility=_number(history.get(MOBILITY, 0.0)),
             factor=stored.symmetry_factor,
+            plate_mass=_number(history.get(PLATE_MASS)),
         )
 
 
@@ -186,7 +188,7 @@ def steps_to_decide(stored: Stored) -> int | None:
     Returns None if no number of steps is known to decide it.
     """
     summarised = _summarised(stored)
-    if summarised is None or not summarised.is_held:
+    if summarised is None:
         return None
     time = float(time_to_decide(summarised.last, summarised.plate)[0])
     dt = float(np.diff(stored["history/time"][-2:], prepend=0.0)[-1])
@@ -200,11 +202,15 @@ def deflection_of(stored: Stored) -> Deflection:
     if rest is not None:  # the energy above the equilibrium under the load
         of_plate = _number(stored.attributes_of("energy").get(INITIAL_PLATE, 0.0))
         energy = energy - of_plate - stored["energy/external_work"]
+    times, rigid = stored["history/time"], None
+    if mobility := _number(stored.attributes_of("history").get(MOBILITY, 0.0)):
+        rigid = RigidMotion.of(stored["history/force"][:, None], times, mobility)
     return Deflection.of(
-        stored["history/plate_w"],
-        stored["history/time"],
-        energy,
+        stored["history/plate_w"][:, None],
+        times,
+        energy[:, None],
         _energy_of_part(stored),
+        rigid,
         start=start_w_of(stored),
         rest=0.0 if rest is None else _number(rest),
     )

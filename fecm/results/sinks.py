@@ -42,8 +42,8 @@ class MemorySink:
         """Set attributes of a group; ``""`` is the file itself."""
         self.groups.setdefault(group, {}).update(values)
 
-    def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
-        """Create a dataset.
+    def create(self, dataset: Dataset, shape: tuple[int, ...], *, grows: bool = False) -> None:
+        """Create a dataset; one that grows may get fewer rows.
 
         Raises ValueError if the dataset is not in the schema.
         """

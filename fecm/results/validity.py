@@ -223,6 +223,7 @@ class Judge(NamedTuple):
     # Velocity that an impulse under the load gives the rigid motion of the plate, 1/mass; 0 if its
     # supports hold the plate.
     mobility: float = 0.0
+    plate_mass: float = np.nan
     preloaded: bool = False  # whether an initial membrane force acts
     curved: bool = False  # whether the plate at rest is curved
     nonlinear: bool = False  # whether stretching follows from bending

@@ -115,6 +115,7 @@ def identity(simulation: Simulation) -> dict[str, Any]:
         "another version of fecm": __version__,
         "another deck": _deck_hash(simulation.problem),
         "another mode or other slips": sorted(options.slips),
+        "a run with another choice of --extend": simulation.problem.work.steps,
         SOLVER: simulation.model.motion.solver,
         "another mass matrix or integrator of the rod": [
             options.rod_method.mass,
@@ -310,7 +311,7 @@ class Checkpointer:
                 dataset = dataset_of(entry["path"], len(shape))
                 if dataset is None:
                     raise CheckpointError(f"{self._spool} has an unknown dataset {entry['path']}")
-                self._sink.create(dataset, shape)
+                self._sink.create(dataset, shape, grows=entry["grows"])
             case Operation.TEXT:
                 self._sink.deck(entry["value"])
             case Operation.WRITE:

@@ -62,9 +62,10 @@ class Interpreter:
         """Passes of the innermost loop after this one."""
         return self._stack[-1].loop.last_pass - self.current_pass
 
-    def skip(self, passes: int) -> None:
-        """Continue at the start of a later pass of the innermost loop."""
+    def skip(self, passes: int, item: int = 0) -> None:
+        """Continue in a later pass of the innermost loop, at the start or at an item."""
         self._stack[-1].number += passes
+        self._stack[-1].index = item
 
     def run(
         self,

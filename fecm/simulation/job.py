@@ -7,7 +7,7 @@ import math
 import shutil
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -19,6 +19,7 @@ from fecm._options import documented, option, with_parameters_of
 from fecm._table import Row, Table, html_table
 from fecm._watch import LOGGER, SILENT, CallerWatch, Progress, StoppedError, Watch
 from fecm.deck.findings import Finding
+from fecm.deck.macros import EXTENDED, extended
 from fecm.listing.printout import Printer
 from fecm.listing.slips import MODES, NAMES, REPORT, Mode, active_slips
 from fecm.mechanics.contact_law import Law
@@ -65,15 +66,18 @@ class Price(NamedTuple):
         measured memory.
     seconds : float
         Approximate time on this machine; NaN if it is not known.
+    at_most : bool
+        Whether the program may end earlier, so that steps, bytes and seconds are upper bounds.
     """
 
     steps: int
     output_bytes: int
     memory_bytes: int
     seconds: float
+    at_most: bool = False
 
     def __str__(self) -> str:
-        parts = [f"{self.steps} steps"]
+        parts = [f"at most {self.steps} steps" if self.at_most else f"{self.steps} steps"]
         if self.output_bytes:
             parts.append(f"{format_bytes(self.output_bytes)} of results")
         parts.append(f"{format_bytes(self.memory_bytes)} of memory")
@@ -143,6 +147,12 @@ class Run:
         group="Result",
         metavar="OUT.h5",
         flag="-o",
+    )
+    extend: bool = option(
+        False,
+        f"Go on after the deck's steps until the impact is over, for at most {EXTENDED} times as "
+        "many steps.  A loop with OVER may then take so many more passes.",
+        group="Limits",
     )
     force: bool = option(
         False,
@@ -247,6 +257,8 @@ class Run:
         self.source: str = self._loaded.source
         self._loaded.refuse_errors(self.force)
         problems = self._loaded.problems
+        if self.extend:
+            problems = [self._extended(problem) for problem in problems]
         for problem in problems:
             check_run_options(problem, self.options)
         self.problems: list[ProblemRun]
@@ -256,6 +268,17 @@ class Run:
         if self.printed or self.resume or self.checkpoint is not None:
             raise OptionsError("printed, resume and checkpoint need an output file")
         self.problems = [ProblemRun(problem, self.options) for problem in problems]
+
+    def _extended(self, problem: Problem) -> Problem:
+        """Return a problem whose loop of impact steps goes on until the impact is over."""
+        if self.options.slips:
+            raise OptionsError("extend needs report mode, without slips")
+        program = extended(problem.program)
+        if program == problem.program:
+            raise OptionsError(
+                f"extend needs a loop with RODP that no other loop contains; {self.source} has none"
+            )
+        return replace(problem, program=program)
 
     def _with_files(self, problems: list[Problem], first: Path) -> list[ProblemRun]:
         """Check the output files, and assign them to the problems."""
@@ -316,8 +339,16 @@ class Run:
     def price(self) -> Price:
         """What the run takes. The time is estimated from the first steps."""
         prices = [job.price for job in self.problems]
-        steps, written, memory, seconds = zip(*prices, strict=True) if prices else ((),) * 4
-        return Price(sum(steps), sum(written), max(memory, default=0), math.fsum(seconds))
+        steps, written, memory, seconds, at_most = (
+            zip(*prices, strict=True) if prices else ((),) * 5
+        )
+        return Price(
+            sum(steps),
+            sum(written),
+            max(memory, default=0),
+            math.fsum(seconds),
+            any(at_most),
+        )
 
     def execute(self) -> Result | list[Result]:
         """Run the problems that are not complete.
@@ -416,6 +447,7 @@ class ProblemRun:
             problem.output_bytes,
             needed_bytes(problem, solver=self.options.solver, in_memory=in_memory),
             before + step * max(1, problem.work.steps),
+            problem.work.at_most,
         )
 
     def execute(self, watch: Watch = SILENT) -> Result:
@@ -453,7 +485,7 @@ class ProblemRun:
         else:
             sink = MemorySink()
             simulation = simulate(problem, sink, self.options, [_observer(watch, problem)])
-            watch.advance(simulation.state.plate.step, problem.work.steps)
+            watch.advance(simulation.state.plate.step, simulation.state.plate.step)
             result = Result(sink.arrays, sink.texts, sink.groups)
             yield result
         watch.note(*result.notes)
@@ -499,7 +531,7 @@ class ProblemRun:
                 checkpointer.restore(simulation)
                 watch.note(f"{path} resumes after step {simulation.state.plate.step}")
             result = run_program(simulation)
-            watch.advance(simulation.state.plate.step, self.problem.work.steps)
+            watch.advance(simulation.state.plate.step, simulation.state.plate.step)
             yield result
         checkpointer.clear()
         watch.note(*simulation.state.notes)
@@ -549,7 +581,7 @@ def seconds_of_steps(start: Callable[[Observer], Simulation]) -> tuple[float, fl
         first = time.perf_counter()
         with contextlib.suppress(_EnoughError):
             run_program(simulation)
-            done, took = simulation.problem.work.steps, time.perf_counter() - first
+            done, took = simulation.state.plate.step, time.perf_counter() - first
     except (FecmError, ArithmeticError):
         return math.nan, math.nan
     return first - begin, took / max(1, done)

@@ -17,9 +17,10 @@ from fecm.mechanics.solutions import static_support
 from fecm.problem.contact_estimates import mean_pressure
 from fecm.problem.estimates import MOST_SOLVED
 from fecm.results.criteria import spelt, yield_stress
-from fecm.results.end import LATE, OPEN_ENDS, OPEN_PEAKS, End
+from fecm.results.end import GO_ON, LATE, OPEN_ENDS, OPEN_PEAKS, End
 from fecm.results.exposure_bands import LEAST_REACH
 from fecm.results.exposures import FEWEST, count_evaluations, largest_exposures
+from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
 from fecm.results.run_metrics import start_w_of, steps_to_decide
 from fecm.results.stored import row_blocks
@@ -307,11 +308,11 @@ def judge_run(simulation: Simulation, result: Result) -> RunVerdict:
 
 def _remedy(result: Result, end: End) -> str:
     """Say how many steps decide whether the plate touches the projectile again."""
-    if end is not End.AGAIN:
+    if end not in (End.AGAIN, End.APART):
         return ""
     if (steps := steps_to_decide(result)) is None:
-        return "; take more steps"
-    return f"; about {steps} more steps decide it"
+        return f"; {GO_ON}"
+    return f"; about {steps} more steps decide it (--extend)"
 
 
 def _later_peak(result: Result) -> Iterator[str]:
@@ -331,7 +332,8 @@ def _late_values(result: Result, end: End) -> Iterator[str]:
         return
     times, w = result["history/time"], result["history/plate_w"]
     late = []
-    if times[w.argmax()] > LATE * times[-1]:
+    is_held = MOBILITY not in result.attributes_of("history")  # a free plate moves away
+    if is_held and times[w.argmax()] > LATE * times[-1]:
         late.append("deflection")
     late += [
         f"exposure {spelt(exposure.criterion)}"

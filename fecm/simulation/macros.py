@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.deck.macros import WORDS, Body, load_factor, macro_number
+from fecm.deck.macros import WORDS, Body, every, load_factor, macro_number
 from fecm.deck.model import Macro
 from fecm.mechanics.impact_steps import FIELDS
 from fecm.mechanics.membrane import strains_of_deflection
@@ -20,6 +20,7 @@ from fecm.mechanics.solutions import ConvergenceError, modes, reactions
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.strains import strains_and_resultants
 from fecm.mechanics.time_step import critical_time_step, taken_time_step
+from fecm.simulation.decision import steps_to_come
 from fecm.simulation.interpreter import Action, EndedError, Passes
 from fecm.simulation.recorder import Steps, Times
 from fecm.simulation.simulation import Simulation
@@ -88,8 +89,29 @@ def impact_step(run: Simulation, n: int) -> None:
     run.observe()
 
 
+def leave_if_over(run: Simulation, n: int, first: float) -> bool:
+    """Execute OVER at every N-th pass, from the M-th on: leave the loop if the impact is over."""
+    state = run.state
+    since = run.interpreter.current_pass - int(first)
+    if since < 0 or since % n or state.plate.step < state.undecided_until:
+        return False
+    if to_come := steps_to_come(run):
+        state.undecided_until = state.plate.step + to_come
+    return not to_come
+
+
+def _passes_to_test(run: Simulation, over: Macro) -> int:
+    """Return the number of passes up to the next one in which OVER looks at the impact."""
+    n, first, number = every(over), int(over.second), run.interpreter.current_pass
+    earliest = max(number, first, number + run.state.undecided_until - run.state.plate.step - 1)
+    return earliest + (first - earliest) % n - number + 1
+
+
 def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
-    """Run passes of a loop with RODP in one call of the kernels."""
+    """Run passes of a loop with RODP in one call of the kernels.
+
+    Passes end before OVER, the last macro of the loop, where OVER looks at the impact.
+    """
     state, plate, steps = run.state, run.state.plate, run.model.steps
     impact, recorder = state.impact, run.recorder
     if impact is None or steps is None or not plate.step:
@@ -99,12 +121,15 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
     if impact.start_w != 0.0:  # the kernels have a projectile that starts at 0
         return False
     count = min(run.interpreter.passes_to_come, run.interval - plate.step % run.interval)
+    over = macros[-1] if macros[-1].word == "OVER" else None
+    until_test = math.inf if over is None else _passes_to_test(run, over)
+    count = int(min(count, until_test))
     later = np.arange(count)
     passes, numbers = run.interpreter.current_pass + later, plate.step + 1 + later
     due = {
         macro.word: (numbers if macro.word == "RODP" else passes) % int(macro_number(macro)) == 0
         for macro in macros
-        if macro.word != "TIME"
+        if macro.word not in ("TIME", "OVER")
     }
     (stored,) = np.nonzero(np.logical_or.reduce(list(due.values())))
     most = max(1, FIELDS // run.problem.mesh.equations.size)
@@ -122,7 +147,10 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
             fields = states.fields if chosen.all() else states.fields[chosen]
             at_steps = states.columns["step"][stored[chosen]].astype(int).tolist()
             STORING[word](run, at_steps, states.columns["time"][stored[chosen]].tolist(), fields)
-    run.interpreter.skip(count)
+    if count == until_test:
+        run.interpreter.skip(count - 1, item=len(macros) - 1)
+    else:
+        run.interpreter.skip(count)
     run.observe()
     return True
 
@@ -216,7 +244,7 @@ def find_modes(run: Simulation, n: int) -> None:
     run.printer.modes(natural_modes.angular_frequency)
 
 
-def _at_passes(word: str, run: Simulation, n: int) -> None:
+def _at_passes(word: str, run: Simulation, n: int, _: float = 0.0) -> None:
     """Execute DISP, PLYS or FAIL at every N-th pass."""
     if not run.interpreter.current_pass % n:
         plate = run.state.plate
@@ -295,6 +323,7 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
     "SOLV": solve_statics,
     "TOL": set_tolerance,
     "CONV": leave_if_converged,
+    "OVER": leave_if_over,
     "REAC": store_reactions,
     "EIGE": find_modes,
     "EXCD": central_difference,
@@ -317,7 +346,8 @@ def bind_loop(run: Simulation, body: Body) -> Passes | None:
     if words.count("RODP") != 1 or len(set(words)) < len(words):
         return None
     first = words.index("RODP")
-    if {*words[:first]} <= {"TIME"} and {*words[first + 1 :]} <= {"TIME", *AT_PASSES}:
+    later = words[first + 1 : -1] if words[-1] == "OVER" else words[first + 1 :]
+    if {*words[:first]} <= {"TIME"} and {*later} <= {"TIME", *AT_PASSES}:
         return partial(impact_steps, run, macros)
     return None
 
@@ -329,7 +359,9 @@ def _end_after(action: Action) -> None:
 
 def bind(run: Simulation, macro: Macro) -> Action:
     """Return the action of a macro."""
-    values = [macro_number(macro)] if WORDS[macro.word].value else []
+    word = WORDS[macro.word]
+    values = [macro_number(macro)] if word.value else []
+    values += [macro.second] if word.second else []
     action: Action = partial(ACTIONS[macro.word], run, *values)
     is_last = macro.word in run.model.variant.program.last_words
     return partial(_end_after, action) if is_last else action

@@ -329,6 +329,7 @@ class Recorder:
     ) -> None:
         self._sink = sink
         self._model = model
+        self._grows = sizes.at_most
         own_criteria = (
             () if model.failure is None else tuple(model.failure.criteria)[len(CRITERIA) :]
         )
@@ -408,7 +409,7 @@ class Recorder:
         The location of tape8's strains is ``"nodes"`` or ``"gauss"``.
         """
         for dataset, shape in self._datasets:
-            self._sink.create(dataset, shape)
+            self._sink.create(dataset, shape, grows=self._grows and dataset.shape[0] == "rows")
         model = self._model
         if (patch := model.patch) is not None:
             values = {"shape": patch.shape, "radius": patch.radius, "x": patch.x, "y": patch.y}
@@ -517,6 +518,18 @@ class Recorder:
         """Continue from a :meth:`state`."""
         for path, part in self._parts().items():
             part.restore(subset(state, f"{path}/"))
+
+    def steps_so_far(self, steps: int) -> dict[str, Array]:
+        """Store the rows of the steps so far, and return the datasets of history and energy."""
+        self.steps.flush()
+        groups = ("history", "energy")
+        for group in groups:
+            self._buffers[group].flush()
+        return {
+            dataset.path: np.asarray(self._sink.arrays[dataset.path][:steps])
+            for dataset, _ in self._datasets
+            if dataset.group in groups
+        }
 
     def failure(self, envelope: FailureEnvelope) -> None:
         """Store the largest exposures of FAIL."""

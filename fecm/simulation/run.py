@@ -12,24 +12,18 @@ from fecm.deck.model import Cure, Deck, Material
 from fecm.deck.units import unit_names
 from fecm.listing.slips import mode_of
 from fecm.mechanics.elements import nodal
-from fecm.mechanics.failure import MODES, largest_in_plies
+from fecm.mechanics.failure import largest_in_plies
 from fecm.mechanics.own_law import law_name
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.build import RunOptions
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem, Threshold
 from fecm.results.exposures import AT_REST, count_evaluations
-from fecm.results.metrics import (
-    FACTOR,
-    INITIAL_PLATE,
-    MOBILITY,
-    REST_W,
-    START_W,
-    VALIDITY,
-)
+from fecm.results.metrics import VALIDITY
 from fecm.results.result import Result
 from fecm.results.schema import KINEMATICS, Form, Kinematics, heading
 from fecm.results.sinks import ReadOnce, Sink
+from fecm.simulation.decision import history_attributes, symmetry_attributes, undoubted
 from fecm.simulation.judge import judge_run
 from fecm.simulation.macros import STORING, bind, bind_loop
 from fecm.simulation.simulation import Observer, Simulation
@@ -92,7 +86,7 @@ def _write_header(simulation: Simulation) -> None:
         **options.rod_method.attributes,
         **_own_parts(options),
         **_units(deck),
-        **_symmetry(simulation.problem),
+        **symmetry_attributes(simulation.problem),
     }
     sink.attributes("", attributes)
     sink.deck(deck.text or deck.to_text())
@@ -143,20 +137,14 @@ def _units(deck: Deck) -> dict[str, str]:
     return {f"unit_{name}": unit for name, unit in unit_names(deck).items()}
 
 
-def _symmetry(problem: Problem) -> dict[str, int]:
-    """Return the attribute of a symmetric part; empty for a whole plate."""
-    factor = problem.symmetry.factor
-    return {FACTOR: factor} if factor > 1 else {}
-
-
 def _write_footer(simulation: Simulation) -> Result:
     """Store what is decided at the end of the run, and reasons to doubt the result."""
     sink = simulation.sink
-    history = _history_attributes(simulation)
+    history = history_attributes(simulation)
     if history:
         sink.attributes("history", history)
     datasets = ReadOnce(sink)
-    result = _undoubted(simulation, datasets, history)
+    result = undoubted(simulation, datasets)
     if (threshold := simulation.problem.threshold) is not None:
         crossing = simulation.state.monitor.crossing
         sink.attributes("threshold", _threshold_attributes(threshold, crossing, result))
@@ -168,38 +156,6 @@ def _write_footer(simulation: Simulation) -> Result:
     if verdict.notes:
         sink.attributes("", {"notes": verdict.notes})
     return Result(datasets, sink.texts, sink.groups, simulation.problem.deck)
-
-
-def _history_attributes(simulation: Simulation) -> dict[str, Any]:
-    """Return the attributes of the history after the last step; empty without impact steps."""
-    impact, system = simulation.state.impact, simulation.model.impact
-    if impact is None or system is None or not impact.plate.step:
-        return {}
-    attributes = {
-        "permanent_indentation": system.law.permanent(impact.memory, impact.contact),
-        "unsettled_steps": impact.unconverged_steps,
-    }
-    if impact.start_w:
-        attributes[START_W] = impact.start_w
-        if simulation.state.rest_factor is not None:
-            attributes[REST_W] = impact.start_w
-    if mobility := simulation.problem.judge.mobility:
-        attributes[MOBILITY] = mobility
-    return attributes
-
-
-def _undoubted(simulation: Simulation, datasets: ReadOnce, history: dict[str, Any]) -> Result:
-    """Return the result before it is judged, with what its metrics need."""
-    problem, steps = simulation.problem, simulation.recorder.steps
-    groups: dict[str, dict[str, Any]] = {
-        "": {**_units(problem.deck), **_symmetry(problem)},
-        "failure": {"modes": list(MODES)},
-        "history": history,
-        "energy": {"initial": steps.initial, INITIAL_PLATE: steps.initial_plate},
-    }
-    if problem.threshold is not None:
-        groups["threshold"] = {"force": problem.threshold.force}
-    return Result(datasets, {}, groups, problem.deck)
 
 
 def _threshold_attributes(threshold: Threshold, crossing: float, result: Result) -> dict[str, Any]:

@@ -151,6 +151,7 @@ class RunState:
     linearised: Floats | None = None
     equilibrium_factor: float = 0.0  # load factor of the last equilibrium that CONV found
     steps_since_output: int = 0  # impact steps since the last output
+    undecided_until: int = 0  # step before which OVER does not look at the end of the impact again
     prop_force: float | None = None  # instead of the contact force
     first_dt: float | None = None  # time step of the rod's constants
     monitor: Monitor = field(default_factory=Monitor)

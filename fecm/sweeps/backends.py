@@ -56,11 +56,12 @@ from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
 from fecm.sweeps.responses import (
     ComputedImpacts,
     Hits,
+    about_rigid_motion,
     impacts,
     largest_sums,
     plate_response,
 )
-from fecm.sweeps.search import LONGER, Sought, search
+from fecm.sweeps.search import LONGER, UNTIL_OVER, Sought, search
 
 # Tasks --------------------------------------------------------------------------------------------
 
@@ -124,7 +125,7 @@ def _plate(
 def _outcome(settings: Settings, problem: Problem, backend: Backend, impacts: Impacts) -> Outcome:
     """Compute impacts on a plate, or find their velocities."""
     if settings.search is None:
-        outcome = backend.outcomes(impacts)
+        outcome = backend.lengthened(backend.durations[0]).outcomes(impacts)
         return _lengthened(outcome, backend, impacts, settings) if backend.lengthens else outcome
     levels = _levels(settings, problem, impacts)
     if problem.deck.has(Nonlinear):
@@ -149,7 +150,7 @@ def _lengthened(
     """Repeat impacts that end between contacts, or may touch again, with a longer response."""
     no_contact = outcome.columns[About.STATUS] == Status.OK
     candidates = np.array(outcome.numbers)[no_contact]
-    for factor in LONGER[1:]:
+    for factor in backend.durations[1:]:
         is_open = np.isin(outcome.numbers, candidates) & np.isnan(outcome.columns[PEAK_FORCE])
         if not is_open.any():
             break
@@ -224,7 +225,12 @@ class ImpulseResponse:
     history: bool = True
     computes_together = True
     lengthens = True
-    _longer: dict[int, ImpulseResponse] = field(default_factory=dict)
+    _longer: dict[float, ImpulseResponse] = field(default_factory=dict)
+
+    @property
+    def durations(self) -> Sequence[float]:
+        """Factors on the duration of the program; see :class:`Backend`."""
+        return UNTIL_OVER if self.problem.work.at_most else LONGER
 
     @cached_property
     def response(self) -> PlateResponse:
@@ -246,7 +252,7 @@ class ImpulseResponse:
             self.problem, self.response, self.measures, impacts, judged, history=self.history
         )
 
-    def lengthened(self, factor: int) -> ImpulseResponse:
+    def lengthened(self, factor: float) -> ImpulseResponse:
         """Return the back end of a run `factor` times as long."""
         if factor == 1:
             return self
@@ -265,7 +271,16 @@ class BendingModes:
     modes: int
     history: bool = True
     computes_together = True
-    lengthens = False
+
+    @property
+    def lengthens(self) -> bool:
+        """Whether cases go on for longer: the program says so, as the reduction takes time."""
+        return self.problem.work.at_most
+
+    @property
+    def durations(self) -> Sequence[float]:
+        """Factors on the duration of the program; see :class:`Backend`."""
+        return UNTIL_OVER if self.problem.work.at_most else LONGER
 
     @cached_property
     def plate(self) -> ReducedImpacts:
@@ -284,7 +299,7 @@ class BendingModes:
             )
         return merge(parts)
 
-    def lengthened(self, factor: int) -> BendingModes:
+    def lengthened(self, factor: float) -> BendingModes:
         """Return the back end of a run `factor` times as long."""
         return replace(self, problem=lengthened(self.problem, factor)) if factor != 1 else self
 
@@ -299,6 +314,7 @@ class FullRuns:
     names: Collection[str] = ()  # of the values of the case, which these columns may not have
     computes_together = False
     lengthens = False
+    durations = LONGER  # a run with OVER ends when it is decided
 
     def outcomes(self, impacts: Impacts, *, judged: bool = True) -> Outcome:
         """Run each impact."""
@@ -315,7 +331,7 @@ class FullRuns:
             law=impacts.own_law,
         )
 
-    def lengthened(self, factor: int) -> FullRuns:
+    def lengthened(self, factor: float) -> FullRuns:
         """Return the back end of a run `factor` times as long."""
         return replace(self, problem=lengthened(self.problem, factor)) if factor != 1 else self
 
@@ -326,6 +342,7 @@ class PlateResponse(NamedTuple):
     response: Floats
     dt: float
     node_mass: float
+    mobility: float  # of the rigid motion, see :class:`~fecm.results.validity.Judge`
     strains: dict[str, Floats]  # response of every gage that is measured, by the name of its column
 
     @property
@@ -335,7 +352,13 @@ class PlateResponse(NamedTuple):
 
     def impacts(self, hits: Hits) -> ComputedImpacts:
         """Compute many impacts."""
-        return impacts(self.response, self.dt, self.node_mass, hits)
+        struck = impacts(self.response, self.dt, self.node_mass, hits)
+        if not self.mobility:
+            return struck
+        plate = about_rigid_motion(
+            struck.plate, self.response, self.dt, self.mobility, hits, struck.force
+        )
+        return struck._replace(plate=plate)
 
 
 def _plate_response(checked: Problem, *, gages: bool) -> PlateResponse:
@@ -352,7 +375,11 @@ def _plate_response(checked: Problem, *, gages: bool) -> PlateResponse:
     with np.errstate(all="ignore"):
         response, strains = plate_response(setup.motion, load, dt, steps, sums)
     return PlateResponse(
-        response, dt, 1.0 / load.inverse_mass, dict(zip(names, strains, strict=True))
+        response,
+        dt,
+        1.0 / load.inverse_mass,
+        checked.judge.mobility,
+        dict(zip(names, strains, strict=True)),
     )
 
 
@@ -405,6 +432,7 @@ def _outcome_together(
             thresholds_of(checked, ordered.toughness),
             checked.judge.mobility,
             checked.symmetry.factor,
+            checked.judge.plate_mass,
         )
         strains = plate.strains if judged else {}
         peaks = {name: CasePeaks(*largest_sums(r, struck.force)) for name, r in strains.items()}

@@ -291,6 +291,7 @@ def _outcome(
         None if checked.threshold is None else checked.threshold.force,
         checked.judge.mobility,
         factor,
+        checked.judge.plate_mass,
     )
     outcome = outcome_of(
         [number],

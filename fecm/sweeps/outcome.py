@@ -100,10 +100,14 @@ class Backend(Protocol):
     def lengthens(self) -> bool:
         """Whether a longer run takes little time, so that it decides open values."""
 
+    @property
+    def durations(self) -> Sequence[float]:
+        """Factors on the duration of the program, until open values are decided."""
+
     def outcomes(self, impacts: Impacts, *, judged: bool = True) -> Outcome:
         """Compute impacts; if judged, impacts with doubtful energies in full."""
 
-    def lengthened(self, factor: int) -> Backend:
+    def lengthened(self, factor: float) -> Backend:
         """Return the back end of a run `factor` times as long."""
 
 

@@ -331,13 +331,40 @@ def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Comput
     ), work
 
 
+def about_rigid_motion(
+    plate: Deflection, response: Floats, dt: float, mobility: float, hits: Hits, force: Floats
+) -> Deflection:
+    """Return the motion of a plate that is not held with what the rigid motion leaves of it.
+
+    `mobility` (1/mass) is the mobility of the rigid motion, `force` are the contact forces (steps,
+    cases). The rigid motion of the plate after n steps is n mobility dt^2 per force in the first.
+    """
+    steps = len(response)
+    bent = rfft(response - mobility * dt**2 * np.arange(1, steps + 1), 2 * steps)
+    times, initial = np.add.accumulate(np.full(steps, dt)), _energies(hits)
+    parts = []
+    for first in range(0, force.shape[1], TILE):
+        part = force[:, first : first + TILE]
+        before = np.concatenate([np.zeros_like(part[:1]), part[:-1]])
+        w = irfft(bent[:, None] * rfft(before, 2 * steps, axis=0), axis=0)[:steps]
+        work = np.add.accumulate(0.5 * (before + part) * np.diff(w, axis=0, prepend=0.0))
+        parts.append(Deflection.of(w, times, work, initial[first : first + TILE]))
+    about = Deflection(*(np.concatenate(values) for values in list(zip(*parts, strict=True))[:5]))
+    return about._replace(largest=plate.largest, last=plate.last)
+
+
+def _energies(hits: Hits) -> Floats:
+    """Return the energies of the projectiles, (cases,)."""
+    masses = np.array([rod.total_mass for rod in hits.rods])[hits.kind] * hits.scale
+    return np.asarray(0.5 * masses * hits.speed**2)
+
+
 class DeflectionRecord:
     """Motion of the plate under the load in impacts that are computed step by step."""
 
     def __init__(self, tips: TipSteps) -> None:
         hits = tips.hits
-        masses = np.array([rod.total_mass for rod in hits.rods])[hits.kind] * hits.scale
-        self._least = LEAST_WORK * 0.5 * masses * hits.speed**2
+        self._least = LEAST_WORK * _energies(hits)
         self._dt = tips.dt
         none = np.zeros(len(hits.kind))
         self.deflection = Deflection(none, none, none, none, none)

@@ -20,6 +20,7 @@ from fecm.authoring.case import (
     parse_exceed,
 )
 from fecm.authoring.impacts import Impacts
+from fecm.deck.macros import EXTENDED
 from fecm.deck.model import Deck, Delamination, Impact
 from fecm.results.exposures import FEWEST
 from fecm.results.metrics import BAND, EVALUATIONS, EXPOSURES, FOUND_BAND
@@ -30,7 +31,10 @@ RANGE = 100.0  # of velocities relative to the deck's
 FIRST_VELOCITIES = 25  # of the first round of a search
 VELOCITY_ERROR = 1e-6  # relative error of the velocity found
 ROUGH = 1e-4  # relative difference of the peak force from its level that counts as a jump
-LONGER = (1, 2, 4, 8)  # times the duration, until the peak at the velocity found is known
+# Factors on the duration, until the peak at the velocity found is known.  A deck with OVER has
+# steps for the longest impacts: its cases begin with a part of them.
+LONGER = (1, 2, 4, 8)
+UNTIL_OVER = (1 / EXTENDED, 2 / EXTENDED, 1, 2)
 BELOW = "the peak force is below"
 
 
@@ -125,9 +129,11 @@ def search(backend: Backend, impacts: Impacts, quantity: Sought, levels: Floats)
 def _search_together(backend: Backend, impacts: Impacts, forces: Floats) -> Outcome:
     """Find the velocities for peak forces; longer runs decide open values."""
     remaining, parts = np.arange(len(impacts)), []
-    for factor in LONGER:
+    for factor in backend.durations:
         longer, still_open = backend.lengthened(factor), []
-        together = -(-len(remaining) // factor)  # as many forces in memory as at first
+        together = math.ceil(
+            len(remaining) / max(1, factor)
+        )  # as many forces in memory as at first
         for start in range(0, len(remaining), together):
             rows = remaining[start : start + together]
             outcome, is_open = _searched(longer, impacts.select(rows), forces[rows])
@@ -136,7 +142,7 @@ def _search_together(backend: Backend, impacts: Impacts, forces: Floats) -> Outc
         remaining = np.concatenate(still_open)
         if not len(remaining):
             return merge(parts)
-    text = f"it is open even in a run {LONGER[-1]} times as long"
+    text = f"it is open even in a run {backend.durations[-1]} times as long"
     reasons = {
         impacts.numbers[row]: f"no peak force of {forces[row]:.6g}: {text}"
         for row in remaining.tolist()
@@ -274,7 +280,7 @@ def _search_in_turn(
     Raises CasesError with the reason if there is no such velocity.
     """
     outcomes: dict[float, Outcome] = {}
-    factors = list(LONGER)  # factors that are left
+    factors = list(backend.durations)  # factors that are left
     largest = largest_exposure if quantity is Sought.EXPOSURE else peak_force
 
     def trial(velocity: float) -> Impacts:
@@ -295,7 +301,7 @@ def _search_in_turn(
             if not math.isnan(value):
                 return value
             del factors[0]
-        text = f"open even in a run {LONGER[-1]} times as long"
+        text = f"open even in a run {backend.durations[-1]} times as long"
         raise CasesError(f"{where} the largest {NAMES[quantity]} is {text}")
 
     start = float(impacts.velocity[row])

@@ -59,18 +59,18 @@ def _end_of_contact() -> Sequence[Value]:
     phase, ones = np.linspace(0.0, np.pi, 20001)[1:-1], np.ones(19999)
     force = np.sin(phase)
     peak = np.maximum.accumulate(force)
-    last = LastContact(force, np.append(0.0, force[:-1]), peak, peak, -np.cos(phase), 0.0 * ones)
+    last = LastContact(force, peak, peak, -np.cos(phase), 0.0 * ones, 10.0 * ones)
 
     def share_with_known_peak(speed: float) -> float:
         """Return the share of the runs that know the peak force, for a velocity of the plate."""
         plate = Deflection(ones, 0.0 * ones, speed * ones, ones, ones)
         return float(peak_known(ends(last, plate)).mean())
 
-    run_ends = ends(last, Deflection(ones, 0.0 * ones, ones, ones, ones))
+    run_ends = ends(last, Deflection(ones, 0.0 * ones, 0.5 * ones, ones, ones))
     # A deflection that still grows, and a deflection that falls with the force.
     growing = np.isfinite(decided(phase, phase, run_ends)).mean()
     falling = np.isfinite(decided(peak, force, run_ends)).mean()
-    return [share_with_known_peak(1.0), share_with_known_peak(3.0), growing, falling]
+    return [share_with_known_peak(0.5), share_with_known_peak(2.0), growing, falling]
 
 
 @case

@@ -12,7 +12,7 @@ from fecm.problem.problem import Problem
 MOST_LAYERS = 25  # layers that the listing's arrays hold (CNPD: QBR(3,3,25), TH(25))
 REMEDY = "Report mode."
 HINT = "run the deck in report mode"
-LATER_MACROS = ("PLYS", "FAIL")
+LATER_MACROS = ("PLYS", "FAIL", "OVER")
 LATER_SEGMENTS = (
     model.Allowables,
     model.Delamination,
@@ -63,8 +63,8 @@ def too_many_layers(problem: Problem) -> Reports:
 def later_words(problem: Problem) -> Reports:
     """The deck has a word that the printed program does not have.
 
-    These are PATC, PLYS, FAIL, ALLO, DELA, DAMP, NONL, PREL, CURV, CURE, MATS, LAMS, ZONE, SHEA
-    MITC and SHEA EQUI.
+    These are PATC, PLYS, FAIL, OVER, ALLO, DELA, DAMP, NONL, PREL, CURV, CURE, MATS, LAMS, ZONE,
+    SHEA MITC and SHEA EQUI.
 
     Remedy: Report mode.
     """

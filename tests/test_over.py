@@ -1,0 +1,151 @@
+"""OVER ends a loop once the impact is over; the pass at which it does depends on the deck alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm import Deck
+from fecm.results import End
+from tests.calls import call
+from tests.decks import LONG, model, small
+from tests.stopped_runs import StoppedError
+from tests.stopped_runs import run as run_stopping
+
+REPORT = LONG.read_text()
+
+
+def until_over(every: int = 20, passes: int = 16000) -> str:
+    """The report's plate and rod, for as long as the impact lasts."""
+    return REPORT.replace("LOOP       4000", f"LOOP      {passes:5}").replace(
+        "NEXT", f"OVER,,{every}\nNEXT"
+    )
+
+
+def test_a_loop_ends_at_the_first_tested_pass_at_which_the_impact_is_over() -> None:
+    run = fecm.run_one(until_over())
+    whole = fecm.run_one(REPORT.replace("LOOP       4000", "LOOP      12000"))
+    steps = len(run.force)
+    assert run.end is End.OVER
+    assert run.notes == tuple(note for note in run.notes if "largest deflection" not in note)
+    assert 4000 < steps < 12000
+    assert steps % 20 == 0
+    assert run.metrics["peak_force"] == pytest.approx(whole.metrics["peak_force"], rel=1e-9)
+    assert run.metrics["rebound_velocity"] == pytest.approx(
+        whole.metrics["rebound_velocity"], rel=1e-9
+    )
+    assert np.abs(run.force - whole.force[:steps]).max() < 1e-9 * whole.force.max()
+
+
+def steps_of(path: Path) -> int:
+    """Number of steps of a stored run."""
+    return len(fecm.load(path).force)
+
+
+def test_no_solver_and_no_size_of_blocks_changes_the_last_pass(tmp_path: Path) -> None:
+    steps = {len(fecm.run_one(until_over(), solver=s).force) for s in ("kernels", "numpy")}
+    for interval in (7, 64, 1000):  # steps of a call of the kernels at most
+        run_stopping(until_over(), tmp_path / "run.h5", interval=interval)
+        steps.add(steps_of(tmp_path / "run.h5"))
+    assert len(steps) == 1
+
+
+def test_a_loop_without_an_end_makes_all_its_passes() -> None:
+    assert len(fecm.run_one(until_over(passes=900)).force) == 900
+
+
+def test_over_waits_for_its_first_pass() -> None:
+    (early,) = {len(fecm.run_one(until_over()).force)}
+    late = fecm.run_one(until_over().replace("OVER,,20", f"OVER,,20,{early + 7}"))
+    assert len(late.force) == early + 7
+
+
+def test_a_deck_is_extended_until_its_impact_is_over() -> None:
+    short = REPORT.replace("LOOP       4000", "LOOP       3000")
+    plain, extended = fecm.run_one(short), fecm.run_one(short, extend=True)
+    assert plain.end is not End.OVER
+    assert any("--extend" in note for note in plain.notes)
+    assert extended.end is End.OVER
+    assert 3000 < len(extended.force) < 12000
+    assert extended.deck_text == plain.deck_text
+    decided = REPORT.replace("LOOP       4000", "LOOP      12000")
+    assert len(fecm.run_one(decided, extend=True).force) == 12000
+
+
+def test_what_can_not_be_extended_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "still.inp").write_text(small("LMAS\nDT        .5E-6\nRODP\n"))
+    done = call("run", tmp_path / "still.inp", "--extend")
+    assert done.exit_code == 2
+    assert "extend needs a loop with RODP" in done.stderr
+    done = call("run", LONG, "--extend", "--mode", "listing", "-o", tmp_path / "x.h5")
+    assert done.exit_code == 2
+    assert "extend needs report mode" in done.stderr
+
+
+def test_a_resumed_run_ends_at_the_same_pass_with_the_same_bytes(tmp_path: Path) -> None:
+    whole, cut = tmp_path / "whole.h5", tmp_path / "cut.h5"
+    looks = run_stopping(until_over(), whole, interval=300)
+    for look in (2, looks // 2, looks):  # also after the contact
+        with pytest.raises(StoppedError):
+            run_stopping(until_over(), cut, look, interval=300)
+        run_stopping(until_over(), cut, resume=True, interval=300)
+        assert cut.read_bytes() == whole.read_bytes()
+        cut.unlink()
+
+
+def test_a_check_says_that_steps_and_bytes_are_upper_bounds(tmp_path: Path) -> None:
+    (tmp_path / "deck.inp").write_text(until_over())
+    out = call("check", tmp_path / "deck.inp").stdout
+    assert "at most 16000" in out
+    assert str(fecm.Run(until_over()).price).startswith("at most 16000 steps")
+    assert "at most" not in call("check", LONG).stdout
+
+
+def test_the_printed_program_has_no_over(tmp_path: Path) -> None:
+    (tmp_path / "deck.inp").write_text(until_over())
+    done = call("check", tmp_path / "deck.inp", "--mode", "listing")
+    assert "The printed program has no OVER" in done.stdout + done.stderr
+
+
+def test_a_sweep_of_a_deck_with_over_knows_what_its_runs_know() -> None:
+    deck = model(until_over())
+    found = fecm.sweep(deck, {"velocity": [60.0, 115.0]}, history=True)
+    for number, velocity in enumerate((60.0, 115.0)):
+        run = fecm.run_one(deck.with_(velocity=velocity))
+        for name in ("peak_force", "rebound_velocity", "impulse", "contacts"):
+            assert found[name][number] == pytest.approx(run.metrics[name], rel=1e-7)
+    assert found.force is not None
+    assert found.force.shape[1] < 16000
+
+
+def test_a_new_deck_without_a_duration_ends_by_itself() -> None:
+    def deck(support: str, mass: float) -> Deck:
+        return fecm.impact(
+            fecm.Plate.rectangle((100, 80), (4, 4), support=support),  # type: ignore[arg-type]
+            fecm.Laminate("[0/90]2s", "T300/5208", 0.25),
+            fecm.RigidMass(mass),
+            fecm.Contact.estimate(radius=8),
+            energy=300,
+            units="mm-N-s",
+        )
+
+    for support, mass in (("simple", 1e-3), ("clamped", 2e-5), ("free", 1e-4)):
+        made = deck(support, mass)
+        words = [macro.word for macro in made.macros]
+        assert words[-2:] == ["OVER", "NEXT"]
+        run = fecm.run_one(made)
+        assert run.end is End.OVER
+        assert len(run.force) < made.macros[words.index("LOOP")].value
+    fixed = fecm.impact(
+        fecm.Plate.rectangle((100, 80), (4, 4), support="simple"),
+        fecm.Laminate("[0/90]2s", "T300/5208", 0.25),
+        fecm.RigidMass(1e-3),
+        fecm.Contact.estimate(radius=8),
+        energy=300,
+        units="mm-N-s",
+        duration=1e-4,
+    )
+    assert "OVER" not in {macro.word for macro in fixed.macros}
