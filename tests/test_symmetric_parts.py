@@ -71,7 +71,8 @@ def test_the_metrics_of_a_part_are_those_of_the_whole_plate(plate: str, part: st
     whole, result = run(plate), run(plate, part)
     assert result.symmetry_factor == 2 ** len(PARTS[part])
     assert result.metrics == pytest.approx(whole.metrics, rel=1e-9, nan_ok=True)
-    assert np.isfinite(result.metrics["peak_force"]) or plate == "rod"
+    # These two runs end before the projectile leaves clearly.
+    assert np.isfinite(result.metrics["peak_force"]) or plate in ("rod", "nonlinear")
     assert result.validity == whole.validity
     first, first_of_whole = result.first_failures, whole.first_failures
     assert len(first) == len(first_of_whole)

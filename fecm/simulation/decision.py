@@ -18,8 +18,9 @@ from fecm.results.result import Result
 from fecm.results.run_metrics import end_of, steps_to_decide
 from fecm.simulation.simulation import Simulation
 
-# Least number of steps between two looks at the impact, over the steps so far.
-AGAIN = 0.02
+# Least number of steps between two looks at the impact, over the steps so far: of a projectile that
+# leaves, and of a projectile that still approaches in contact.
+AGAIN, APPROACHING = 0.02, 0.25
 
 
 def history_attributes(simulation: Simulation) -> dict[str, Any]:
@@ -76,7 +77,8 @@ def steps_to_come(simulation: Simulation) -> int:
         return 0
     least = math.ceil(AGAIN * steps)
     if impact.contact.force > 0.0:
-        return least
+        approaches = impact.rod.velocity[0] < 0.0
+        return math.ceil(APPROACHING * steps) if approaches else least
     result = undoubted(simulation, simulation.recorder.steps_so_far(steps))
     if end_of(result) is not End.OVER:
         return max(least, steps_to_decide(result) or 0)
