@@ -270,9 +270,10 @@ def test_findings_and_doubtful_cases_are_warnings_with_counts(tmp_path: Path) ->
         found = fecm.sweep(small(), layups, output=tmp_path / "s.h5")
     texts = [str(warning.message) for warning in caught]
     assert {warning.filename for warning in caught} == {__file__}
-    assert sum("warning[W" in text for text in texts) == len(texts) - 4
+    assert len(texts) > 1
+    assert all("warning[W" in text for text in texts[:-1])
     notes = list(found.notes)
-    assert texts[-4:] == notes == list(fecm.load_sweep(tmp_path / "s.h5").notes)
+    assert texts[-1].splitlines() == notes == list(fecm.load_sweep(tmp_path / "s.h5").notes)
     assert notes[0] == "2 of 4 cases still in contact at the end"
     assert notes[1] == "2 of 4 cases with an open peak"
     assert notes[2].startswith("2 of 4 cases failed: layup: the layup `[x]`")
