@@ -90,7 +90,7 @@ def test_the_force_of_a_plate_without_impact_stays_in_the_middle_of_another_plat
     ("values", "message"),
     [
         ({"at": (50.0, 50.0)}, "`at` is the place of `force`"),
-        ({"force": "10J"}, "`force` is '10J', not a number or one with a unit, as in 10N"),
+        ({"force": "10J"}, "`force` is '10J', not a number or one with a unit, as in 6kN"),
         ({"force": math.nan}, "`force` is nan; it must be a finite number"),
         ({"kinematics": "auto"}, "`kinematics` is 'auto', none of linear, von-karman"),
         ({"program": 3}, "`program` is 3, not the cards of a macro program"),

@@ -45,7 +45,7 @@ def test_a_script_has_a_title_and_is_short(script: Path) -> None:
     assert tree.body[0].end_lineno
     below = script.read_text().splitlines()[tree.body[0].end_lineno :]
     code = [line for line in below if line and not line.startswith("# ")]
-    assert 8 <= len(code) <= LONGER.get(script.stem, 25)
+    assert 6 <= len(code) <= LONGER.get(script.stem, 25)
 
 
 @pytest.mark.parametrize("script", RUNS)

@@ -113,8 +113,11 @@ def test_errors_of_the_energy_balance_are_those_of_numpy(monkeypatch: pytest.Mon
     np.testing.assert_allclose(found.error[finite], wanted.error[finite], rtol=1e-6, atol=1e-9)
     assert not found.error[3] < 1.0
     for name, values in wanted.plate._asdict().items():
-        computed = getattr(found.plate, name)[finite]
-        np.testing.assert_allclose(computed, values[finite], rtol=1e-9, err_msg=name)
+        computed, expected = (
+            np.broadcast_to(column, finite.shape)[finite]
+            for column in (getattr(found.plate, name), values)
+        )
+        np.testing.assert_allclose(computed, expected, rtol=1e-9, err_msg=name)
 
 
 @compiled

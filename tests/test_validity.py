@@ -133,7 +133,8 @@ def test_a_run_in_python_warns_the_same_with_and_without_a_file(tmp_path: Path) 
     for output in (None, tmp_path / "p.h5"):
         with pytest.warns(fecm.FecmWarning) as caught:
             fecm.run_one(text, output=output)
-        texts = [f"fecm: note: {warning.message}" for warning in caught]
+        lines = [line for warning in caught for line in str(warning.message).splitlines()]
+        texts = [f"fecm: note: {line}" for line in lines]
         assert [text for text in texts if "beyond" in text] == told
 
 
