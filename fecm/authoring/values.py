@@ -97,9 +97,9 @@ STRIKE_VALUES: tuple[SweepValue[StrikeSetter], ...] = (
     SweepValue("velocity", Changes.STRIKE, _SPEED, strike.set_velocity,
              meaning="approach velocity of `ROD`"),
     SweepValue("energy", Changes.STRIKE, "force*length", strike.set_energy,
-             meaning="½ m v² of the projectile, instead of `velocity`; with the mass of the case. Of "
-                     "[half or a quarter of a plate](making.md#half-or-a-quarter-of-a-plate) the "
-                     "energy of the whole impact"),
+             meaning="½ m v² of the projectile, instead of `velocity`; with the mass of the case. "
+                     "Of [half or a quarter of a plate]"
+                     "(making.md#half-or-a-quarter-of-a-plate) the energy of the whole impact"),
     SweepValue("k", Changes.STRIKE, "force/length^1.5", strike.constant("k"),
              meaning="contact coefficient of `EXPE`"),
     SweepValue("radius", Changes.STRIKE, "length", strike.set_radius,
