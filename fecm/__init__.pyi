@@ -32,6 +32,7 @@ from fecm.mechanics.failure import CriterionError as CriterionError
 from fecm.mechanics.failure import FailureCriterion as FailureCriterion
 from fecm.mechanics.failure import Strengths as Strengths
 from fecm.mechanics.own_law import LawError as LawError
+from fecm.mechanics.plate import PlateModel as PlateModel
 from fecm.mechanics.plate_motion import DivergenceError as DivergenceError
 from fecm.mechanics.projectile import LinearProjectile as LinearProjectile
 from fecm.mechanics.projectile import ProjectileError as ProjectileError
@@ -39,6 +40,7 @@ from fecm.mechanics.projectile import RigidMass as RigidMass
 from fecm.mechanics.projectile import Rod as Rod
 from fecm.problem.deck_check import DeckCheck as DeckCheck
 from fecm.problem.deck_check import check as check
+from fecm.problem.loading import plate_model as plate_model
 from fecm.problem.loading import read_one as read_one
 from fecm.problem.plate_mesh import MeshError as MeshError
 from fecm.results.diff import assert_same as assert_same

@@ -28,6 +28,8 @@ deck: fecm.Deck = fecm.read_one("plate.inp")
 again: fecm.Result = fecm.run_one(deck, progress=lambda step, steps: print(step / steps))
 axes: Axes = result.plot("loop", ax=result.plot("force"), against="displacement")
 similarity: float = result.compare("shot-3.csv").correlation
+discrete: fecm.PlateModel = fecm.plate_model(deck)
+nodes: NDArray[np.float64] = discrete.field(discrete.nodal_loads / discrete.mass)
 checked: fecm.DeckCheck = fecm.check(deck, "listing")
 codes: list[str] = [finding.code for finding in checked.errors]
 critical: list[float] = [problem.critical_time_step for problem in checked.problems]

@@ -18,6 +18,8 @@ DIRECTIVE = re.compile(r"^\.\. auto(?!module)\w+:: (\S+)\n((?:   :.*\n)*)", re.M
 HELD = {
     "fecm.authoring.plate.DropWeight",
     "fecm.deck.card.CardSource",
+    "fecm.mechanics.element_matrices.IntegrationRules",
+    "fecm.mechanics.laminate.LaminateSection",
     "fecm.results.groups.GroupSource",
     "fecm.results.stored.Stored",
     "fecm.studies.indentation_test.curves.CurveSolution",

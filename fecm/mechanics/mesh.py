@@ -30,15 +30,31 @@ TOLERANCE = 1.0e-9
 PARALLEL = 1.0e-2  # two sides form no corner if their directions differ by less
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeshArrays:
-    """Nodes, elements, restraints and nodal forces of a problem."""
+    """Nodes, elements, restraints and nodal forces of a problem.
 
-    coordinates: Floats  # (numnp, 2): length; NaN for undefined nodes
-    elements: Ints  # (numel, nen): node numbers, 0 where absent
-    codes: Ints  # (numnp, 5): restraint codes; a dof with a nonzero code is restrained
-    forces: Floats  # (numnp, 5): nodal force, or displacement of a restrained dof
-    equations: Ints  # (numnp, 5): numbers in the order of nodes and dofs, 0 where restrained
+    Dofs are u, v, w, theta_x, theta_y.
+
+    Attributes
+    ----------
+    coordinates : ndarray (numnp, 2)
+        x and y of the nodes, length; NaN for undefined nodes.
+    elements : ndarray (numel, nen) of int
+        Node numbers, from 1; 0 where a node is absent.
+    codes : ndarray (numnp, 5) of int
+        Restraint codes; a dof with a nonzero code is restrained.
+    forces : ndarray (numnp, 5)
+        Nodal force or moment, or displacement of a restrained dof.
+    equations : ndarray (numnp, 5) of int
+        Equation numbers, from 1, in the order of nodes and dofs; 0 where restrained.
+    """
+
+    coordinates: Floats
+    elements: Ints
+    codes: Ints
+    forces: Floats
+    equations: Ints
 
     @property
     def number_of_equations(self) -> int:

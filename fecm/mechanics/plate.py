@@ -43,9 +43,26 @@ class UnsoundPlateError(FecmError, ArithmeticError):
     """The plate's stiffness is not finite, or no largest frequency is found."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlateModel:
-    """The discrete plate: M a + f(u) = P, with f(u) = K u unless it is nonlinear."""
+    """The discrete plate: M a + f(u) = P, with f(u) = K u unless it is nonlinear (equation 4-14).
+
+    :func:`fecm.plate_model` builds it from a deck.  Quantities have the deck's units.  Vectors,
+    (neq,), contain the free dofs u, v, w, theta_x, theta_y of node 1, then of node 2, and so on.
+    A matrix is assembled when it is first used.
+
+    Attributes
+    ----------
+    mesh : MeshArrays
+        Nodes, elements, restraints, nodal forces, and the equation number of every dof.
+    preload : tuple of float (3,)
+        Initial membrane force N0_x, N0_y, N0_xy, force/length; `stiffness` contains its effect.
+    curvature : tuple of float (3,)
+        1/R_x, 1/R_y, 1/R_xy of a shallow panel, 1/length; `stiffness` contains its effect.
+    nonlinear : bool
+        Whether the plate stretches as it bends (NONL); `stiffness` is then that of the plate at
+        rest.
+    """
 
     mesh: MeshArrays
     laminate: LaminateSection
@@ -60,7 +77,7 @@ class PlateModel:
 
     @property
     def neq(self) -> int:
-        """Number of equations."""
+        """Number of equations, one for each free dof."""
         return self.mesh.number_of_equations
 
     @property
@@ -209,7 +226,15 @@ class PlateModel:
 
     @cached_property
     def stiffness(self) -> sparse.csr_array:
-        """K, sparse (neq, neq); assembled on first access."""
+        """K, sparse (neq, neq): force/length; force*length for rotations.
+
+        It is the tangent at rest, with the effects of curvature and preload.
+
+        Raises
+        ------
+        NotEnoughMemoryError
+            If the assembly needs more memory than is free; a MemoryError.
+        """
         return self._with_supports[:, : self.neq].tocsr()
 
     @cached_property
@@ -228,7 +253,7 @@ class PlateModel:
 
     @cached_property
     def mass(self) -> Floats:
-        """Lumped M, (neq,)."""
+        """Diagonal of the lumped M, (neq,): mass; mass*length^2 for rotations."""
         mass = np.zeros(self._numbers.size)
         for family, determinants in zip(self.families, self._determinants, strict=True):
             laminate, rule = self.laminate_of(family), self.rules.bending
@@ -240,7 +265,15 @@ class PlateModel:
 
     @cached_property
     def consistent_mass(self) -> sparse.csr_array:
-        """Consistent M, sparse (neq, neq), with the bending rule; assembled on first access."""
+        """Consistent M, sparse (neq, neq): mass; mass*length^2 for rotations.
+
+        Its integrals have the quadrature of bending.
+
+        Raises
+        ------
+        NotEnoughMemoryError
+            If the assembly needs more memory than is free; a MemoryError.
+        """
         rule = self.rules.bending
         with_supports = self.assembled(
             lambda f: element_matrices.consistent_mass(f, self.laminate_of(f), rule)
@@ -258,7 +291,7 @@ class PlateModel:
         return sum(self._areas)
 
     def total_mass(self) -> float:
-        """Return the mass of the plate."""
+        """Return the mass of the plate, force*time^2/length."""
         if not self.others:
             return self.area() * self.laminate.mass
         masses = (self.laminate_of(family).mass for family in self.families)
@@ -287,7 +320,10 @@ class PlateModel:
 
     @property
     def nodal_loads(self) -> Floats:
-        """Nodal forces minus internal forces of the prescribed displacements, (neq,)."""
+        """P, (neq,): nodal forces minus internal forces of the prescribed displacements.
+
+        The forces are those of FORC and the static force of PATC, at a proportional load of 1.
+        """
         forces, free = self.mesh.forces, self._free
         loads = forces[free]
         if forces[~free].any():
@@ -295,7 +331,20 @@ class PlateModel:
         return np.asarray(loads)
 
     def field(self, displacement: Floats, scale: float = 1.0) -> Floats:
-        """Return all dofs, (numnp, 5): free dofs, (neq,), and `scale` times prescribed dofs."""
+        """Return all dofs of all nodes.
+
+        Parameters
+        ----------
+        displacement : ndarray (neq,)
+            Displacements of the free dofs: length, or radians.
+        scale : float
+            Factor of the prescribed displacements; 0 for velocities and mode shapes.
+
+        Returns
+        -------
+        ndarray (numnp, 5)
+            u, v, w, theta_x, theta_y of every node.
+        """
         full = scale * self.mesh.forces
         full[self._free] = displacement
         return full

@@ -216,8 +216,9 @@ class StrainField:
         transposed_jacobian: bool = False,
         assumes_shear: bool = False,
     ) -> None:
-        self.shape = (len(elements), len(rule.xi))
-        self.rule, self.assumes_shear = rule, assumes_shear
+        self.shape: tuple[int, int] = (len(elements), len(rule.xi))
+        self.rule: Quadrature = rule
+        self.assumes_shear: bool = assumes_shear
         self.transposed_jacobian = transposed_jacobian
         self._mesh = elements, coordinates
 

@@ -12,10 +12,16 @@ from fecm.deck.findings import DeckError, Finding
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, load_text, read_deck
 from fecm.listing.slips import LISTING, REPORT
+from fecm.mechanics.plate import PlateModel
 from fecm.problem.check import check_listing, check_problem
 from fecm.problem.problem import Problem
 from fecm.problem.rules.quadrature import HOURGLASS
 from fecm.problem.rules.time_step import UNSTABLE
+
+TANGENT = (
+    "the plate stretches as it bends (NONL): `stiffness` is the stiffness at rest, and the "
+    "internal forces of a deflected plate are not K u"
+)
 
 _Problem = TypeVar("_Problem")
 
@@ -117,6 +123,46 @@ def read_one(path_or_text: str | Path | AnyFile) -> Deck:
     """
     read = read_deck(path_or_text)
     return sole([read] if isinstance(read, Deck) else read)
+
+
+def plate_model(deck: AnyDeck) -> PlateModel:
+    """Build the discrete plate of a deck: K, M and P of M a + K u = P (equation 4-14).
+
+    It is the plate that :func:`fecm.run_one` moves. Projectile, contact law, damping and macro
+    program are not part of it. A deck with lines of symmetry gives the part of the plate that it
+    describes. Each warning about the deck is a :class:`~fecm.FecmWarning`.
+
+    Parameters
+    ----------
+    deck : str, Path, file or Deck
+        Deck with a single problem: a file's path, a deck's text, an open file, or a model built in
+        Python.
+
+    Returns
+    -------
+    PlateModel
+        Matrices and loads in the deck's units.
+
+    Raises
+    ------
+    DeckError
+        If the deck has errors.
+    OptionsError
+        If it does not have exactly one problem.
+    OSError
+        If the file can't be read.
+
+    Examples
+    --------
+    >>> import fecm
+    >>> plate = fecm.plate_model("decks/static-bending.inp")
+    >>> plate.stiffness.shape == (plate.neq, plate.neq)
+    True
+    """
+    plate = sole_problem(deck).plate
+    if plate.nonlinear:
+        warn(TANGENT)
+    return plate
 
 
 def sole(problems: Sequence[_Problem], deck: str | Path = "the deck") -> _Problem:
