@@ -42,7 +42,7 @@ from fecm.problem.parts import (
     rules,
     strengths_of_deck,
 )
-from fecm.problem.symmetry import Symmetry, symmetry_of
+from fecm.problem.symmetry import PartSymmetry, symmetry_of
 from fecm.results.groups import GROUPS
 from fecm.results.schema import values_per_row
 from fecm.results.validity import Judge, in_plane_of
@@ -395,9 +395,9 @@ class Problem:
         return max(exposures, key=lambda pair: pair[0].exposure, default=None)
 
     @cached_property
-    def symmetry(self) -> Symmetry:
+    def symmetry(self) -> PartSymmetry:
         """Lines of symmetry of the plate; none without an impact."""
-        return symmetry_of(self.deck, self.mesh) if self.has_impact else Symmetry()
+        return symmetry_of(self.deck, self.mesh) if self.has_impact else PartSymmetry()
 
     @property
     def projectile_mass(self) -> float:

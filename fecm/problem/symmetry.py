@@ -62,7 +62,7 @@ class SymmetryLine(NamedTuple):
         return f"{AXES[self.axis]} = {self.place:.6g}"
 
 
-class Symmetry(NamedTuple):
+class PartSymmetry(NamedTuple):
     """Lines of symmetry of a plate of which a deck has one part."""
 
     struck: tuple[SymmetryLine, ...] = ()  # lines through the impact node
@@ -107,15 +107,15 @@ class Symmetry(NamedTuple):
         return " and ".join(map(str, self.struck))
 
 
-def symmetry_of(deck: Deck, mesh: MeshArrays) -> Symmetry:
+def symmetry_of(deck: Deck, mesh: MeshArrays) -> PartSymmetry:
     """Return the lines of symmetry of the plate of a deck with an impact."""
     lines = tuple(symmetry_lines(deck, mesh))
     struck = tuple(line for line in lines if _is_struck(line, deck, mesh))
-    return Symmetry(struck, tuple(line for line in lines if line not in struck))
+    return PartSymmetry(struck, tuple(line for line in lines if line not in struck))
 
 
 def symmetry_factor(deck: Deck) -> int:
-    """Return the number of equal parts of the plate of a deck: see :class:`Symmetry`."""
+    """Return the number of equal parts of the plate of a deck: see :class:`PartSymmetry`."""
     return symmetry_of(deck, generate(deck)).factor
 
 
