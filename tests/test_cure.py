@@ -385,6 +385,9 @@ def test_a_search_finds_the_velocity_at_which_residual_and_other_stresses_reach_
     assert velocity < 0.8 * free
     single = fecm.run_one(struck(-6.0).with_(velocity=velocity))
     assert max(one.exposure for one in largest_exposures(single)) == pytest.approx(1.0, rel=2e-5)
+
+
+def test_a_search_for_an_exposure_that_the_plate_at_rest_has_is_refused() -> None:
     (status,) = fecm.sweep(struck(-9.0), until={"exposure": 1.0})["status"]
     assert status.startswith("the plate at rest has the exposure 1.1")
 

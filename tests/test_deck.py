@@ -111,10 +111,29 @@ def test_whatever_ten_columns_held_can_be_written_into_ten_columns(text: str) ->
         assert parse_real(written) == value
 
 
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1.2345678e12, "12345678+5"), (-1.234567e12, "-1234567+6"), (1.234567e-4, "1.234567-4"),
+     (1234567891.0, "1234567891"), (1.2345678e-4, None)],
+)  # fmt: skip
+def test_ten_columns_take_an_exponent_without_its_letter_and_a_number_without_its_point(
+    value: float, text: str | None
+) -> None:
+    assert format_real(value, 10) == text
+
+
 def test_an_all_blank_field_is_zero() -> None:
     deck = fecm.read_one(small(data=DATA_CARDS.replace("      .106", "      .106          ")))
     assert deck.require(Material).integration.width == 0.0
     assert deck.macros[0] == Macro("LMAS")
+
+
+def test_the_card_of_the_last_element_needs_no_blank_card_behind_it() -> None:
+    middle, corner = "   11   13   23   21   12   18   22   16   17", 2
+    shifted = "".join(f"{int(node) + corner:5}" for node in middle.split())
+    ended = small().replace(f"{middle}    2\n\n", f"{middle}\n    4{shifted}\n")
+    assert ended != small()
+    assert fecm.read_one(ended).require(Elements).records[-1].element == 4
 
 
 def test_segments_may_stand_in_any_order() -> None:

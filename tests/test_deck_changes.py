@@ -123,6 +123,16 @@ def test_a_contact_is_converted_to_the_units_of_the_deck() -> None:
     assert law.alpha_p == pytest.approx(6.564e-4 * 25.4, rel=1e-5)
 
 
+def test_an_estimated_contact_is_the_same_in_units_of_force_and_of_mass() -> None:
+    k, in_kilonewtons = (
+        fecm.impact(PLATE, PLIES, MASS, SPHERE, velocity=1.0, duration=1e-5, units=units)
+        .require(Indentation)
+        .k
+        for units in ("mm-N-s", "mm-ms-kg")
+    )
+    assert in_kilonewtons == pytest.approx(k / 1000.0, rel=1e-5)
+
+
 def test_a_ply_with_other_constants_brings_its_strengths_or_is_refused() -> None:
     strengths = DECK.with_(laminate=COUPLED).require(Allowables)
     assert strengths == fecm.impact(PLATE, COUPLED, MASS, FIRM, **DAMAGED).require(Allowables)

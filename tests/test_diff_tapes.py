@@ -232,7 +232,6 @@ TAPES = {
     [*TAPES, "truncated", "binary", "empty", "foreign", "later", "folder", "both", "twice",
      pytest.param("pipe", marks=pytest.mark.links), "missing"],
 )  # fmt: skip
-@pytest.mark.few(7)  # of 21, 0.04 s each
 def test_what_cant_be_compared_exits_2_with_one_line(runs: Path, tmp_path: Path, name: str) -> None:
     wrong = spoiled(name, tmp_path, runs / "report.h5")
     for sides in ((runs / "report.h5", wrong), (wrong, runs / "report.h5")):

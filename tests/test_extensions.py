@@ -363,7 +363,6 @@ def _five() -> list[Any]:
         ("norris", "criteria is 'norris'; pass a list"),
     ],
 )
-@pytest.mark.few(5)  # of 16, 0.02 s each
 def test_a_faulty_criterion_is_named_with_its_fault(
     damaged: fecm.Deck, given: Any, fault: str
 ) -> None:

@@ -106,6 +106,10 @@ def test_exposures_are_the_largest_of_all_stored_displacements() -> None:
         assert set(np.unique(found[f"failure/{name}/time"])) <= {0.0, *found["tape3/time"]}
 
 
+def test_exposures_of_a_run_have_a_row_for_every_nth_step_and_none_at_rest() -> None:
+    assert fecm.run_one(failing(every=2))["exposures/step"].tolist() == [2, 4, 6, 8, 10]
+
+
 def test_the_summary_names_criterion_mode_ply_place_and_time(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(failing())
     done = call("run", "d.inp", cwd=tmp_path)

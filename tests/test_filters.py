@@ -76,9 +76,7 @@ def test_what_is_no_filter_is_refused_with_what_one_is(text: str) -> None:
         filter_of(text)
 
 
-@pytest.mark.parametrize(
-    ("size", "unit"), [(60, "s"), (180, "s"), (180, "ms"), (600, "s"), (1000, "s")]
-)
+@pytest.mark.parametrize(("size", "unit"), [(60, "s"), (1000, "ms")])
 def test_a_class_follows_the_corridor_of_sae_j211(size: int, unit: str) -> None:
     second = {"s": 1.0, "ms": 1e3}[unit]
     filtered = filter_of(f"cfc:{size}").in_unit(unit)

@@ -143,6 +143,18 @@ def test_a_note_says_where_the_mesh_decides_the_energy(
     assert (text in done.stdout) is not noted
 
 
+def test_the_note_counts_the_cases_whose_energy_the_mesh_decides() -> None:
+    sweep = fecm.sweep(small(), {"velocity": [50.0, 80.0, 110.0]})
+
+    def notes(*low: float) -> str:
+        energies = {"found_energy": np.ones(3), "found_energy_low": np.array(low)}
+        found = fecm.SweepResult(sweep.cases, sweep.summary | energies, sweep.dt, sweep.steps)
+        return "\n".join(found.notes)
+
+    assert "the mesh decides the energy in 1 of 3 cases" in notes(0.74, 0.76, 1.0)
+    assert "the mesh decides the energy" not in notes(0.76, 1.0, 1.0)
+
+
 @pytest.mark.long
 def test_each_case_of_a_sweep_has_its_velocity() -> None:
     together = fecm.sweep(DECK, {"layup": ["[0/90]", "[0/0]"]}, until={"exposure": 0.5})

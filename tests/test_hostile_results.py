@@ -268,7 +268,6 @@ def regions(file: h5py.File) -> None:
         (regions, "holds references"),
     ],
 )
-@pytest.mark.few(2)  # of 6, 0.06 s each
 def test_what_leads_to_another_object_is_refused_by_name(
     result: Path, edit: Callable[[h5py.File], None], reason: str
 ) -> None:

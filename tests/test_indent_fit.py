@@ -144,6 +144,7 @@ def test_partial_unloadings_reload_from_an_origin_of_their_own() -> None:
 
 @pytest.mark.parametrize("part", [0.0, 0.005, 0.01])
 @pytest.mark.parametrize("points", [40, 100, 1000])
+@pytest.mark.few(3)
 def test_cycles_are_found_in_noisy_paths_of_few_and_many_points(part: float, points: int) -> None:
     a, _ = make_test(points=points)
     for seed in range(5):

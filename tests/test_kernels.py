@@ -9,7 +9,6 @@ import shutil
 import subprocess
 from dataclasses import replace
 from functools import lru_cache
-from importlib import import_module
 from pathlib import Path
 
 import h5py
@@ -49,6 +48,7 @@ from fecm.mechanics import (
     strains,
     symmetry_reduction,
 )
+from fecm.mechanics.kernels.failure import COMPILED
 from fecm.problem import Problem, RunOptions, build_model, load_deck
 from tests.builders import (
     boundary,
@@ -312,7 +312,6 @@ def declared_constants() -> dict[str, int]:
 
 
 def test_the_structures_of_python_have_the_fields_of_those_of_c() -> None:
-    import_module("fecm.mechanics.kernels.failure")  # nothing else here needs its structures
     python = {
         kind.__name__.removesuffix("Struct"): kind for kind in kernels.Structure.__subclasses__()
     }
@@ -328,7 +327,7 @@ def test_the_structures_of_python_have_the_fields_of_those_of_c() -> None:
         ]
         for name, fields in declared_structures().items()
     }
-    assert len(expected) == 18
+    assert len(expected) == HEADER.read_text(encoding="utf-8").count("typedef struct {")
     assert {name: [tuple(field) for field in kind._fields_] for name, kind in python.items()} == (
         expected
     )
@@ -345,12 +344,29 @@ def test_the_enumerations_of_python_have_the_values_of_those_in_c() -> None:
         "GIVEN": len(Given),
         "FOUND": len(ResultRow),
         "LANES": LANES,
-        "CRITERIA": len(failure.CRITERIA),
+        "CRITERIA": len(COMPILED),
         "TIED": 2 * max(len(along) * len(across) for along, across, _ in strains.TYING.values()),
         "PASSES": impact.PASSES,
         "TYING": TYING,
     }
     assert declared_constants() == expected
+
+
+def test_the_failure_criteria_of_c_have_the_names_candidates_and_modes_of_those_in_python() -> None:
+    code = HEADER.with_name("kernels.c").read_text(encoding="utf-8")
+    (named,) = re.findall(r"enum \{ CANDIDATES = (\d+), HASHIN = (\d+), PUCK = (\d+) \};", code)
+    lists = dict(re.findall(r"(CODES|BEGIN)\[.*?\] = \{(.*?)\};", code))
+    codes, begin = (list(map(int, lists[name].split(","))) for name in ("CODES", "BEGIN"))
+    one = np.ones(1)
+    strengths = fecm.Strengths(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 1.0, 0.3, 1.0)
+    modes = [
+        [mode for mode, _ in failure.CRITERIA[name](strengths, one, one, one)] for name in COMPILED
+    ]
+    assert list(failure.CRITERIA)[: len(COMPILED)] == list(COMPILED)
+    assert begin == [0, *itertools.accumulate(map(len, modes))]
+    assert [failure.MODES[number] for number in codes] == [*itertools.chain.from_iterable(modes)]
+    places = [COMPILED.index(name) for name in ("hashin", "puck")]
+    assert [int(number) for number in named] == [len(codes), *places]
 
 
 def test_a_structure_takes_arrays_of_its_types_in_c_order() -> None:

@@ -327,6 +327,14 @@ def test_displacements_without_impact_steps_and_impact_steps_without_displacemen
     assert "history/force" not in alone
 
 
+def test_a_loop_inside_the_loop_of_impact_steps_runs_at_every_pass() -> None:
+    every = PROGRAM.replace("DISP          5", "DISP")
+    inside = PROGRAM.replace("DISP          5", "LOOP          1\nDISP\nNEXT")
+    found, expected = run(small(inside)).tape3, run(small(every)).tape3
+    assert found.step.tolist() == list(range(1, 11))
+    np.testing.assert_allclose(found.w, expected.w, rtol=0.0, atol=1e-12 * np.abs(expected.w).max())
+
+
 def test_central_differences_and_impact_steps_share_one_plate() -> None:
     text = small("LMAS\nDT        .5E-6\nLOOP          4\nTIME\nRODP\nNEXT\nEXCD\nRODP\n")
     result = run(text)

@@ -73,6 +73,7 @@ def with_stiffness(D: Sequence[Sequence[float]]) -> LaminateSection:
 
 @pytest.mark.parametrize("ratio", [1.0, 1.001, 15.0, 300.0, 1e6])
 @pytest.mark.parametrize("shear", [1e-3, 0.3, 1.0, 30.0])
+@pytest.mark.few(4)
 def test_the_effective_rigidity_is_the_elliptic_integral_of_orthotropic_plates(
     ratio: float, shear: float
 ) -> None:
@@ -96,6 +97,7 @@ ANGLES = {
 
 @pytest.mark.parametrize("turn", [22.5, 37.0, 45.0, 90.0, -71.0])
 @pytest.mark.parametrize("layup", ANGLES)
+@pytest.mark.few(4)
 def test_the_effective_rigidity_does_not_depend_on_the_axes(layup: str, turn: float) -> None:
     ply, angles = Ply(1.0, 0.3, 141e3, 9.75e3, 5.2e3, 5.2e3, 3.2e3), ANGLES[layup]
     thick = [4.0 / len(angles)] * len(angles)

@@ -471,7 +471,6 @@ def test_the_cost_is_told_beforehand(folder: Path) -> None:
         ((*UNIFORM, "--exceed", "peak_force=threshold"), "DELA"),
     ],
 )  # fmt: skip
-@pytest.mark.few(10)  # of 33, 0.01 s each
 def test_bad_input_is_one_line(folder: Path, options: tuple[object, ...], told: str) -> None:
     done = sweep(folder, *options)
     assert_unusable(done)

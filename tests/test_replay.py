@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -218,6 +220,13 @@ def test_a_stored_state_goes_on_as_if_nothing_had_happened() -> None:
         fresh.advance(again, 2e-7)
     for name, array in saved_values(state, "state").items():
         np.testing.assert_array_equal(saved_values(again, "state")[name], array)
+
+
+@pytest.mark.parametrize("at_start", [None, (0.0, None)])
+def test_the_tuples_of_a_laws_memory_are_tuples_again_after_json(at_start: Any) -> None:
+    memory = (1.5, (2.5, None), "loaded")
+    stored = json.loads(json.dumps(saved_values(memory, "memory")))
+    assert restore(at_start, "memory", stored) == memory
 
 
 def impact_of(deck: Path) -> ImpactSystem:

@@ -446,6 +446,40 @@ def test_a_static_result_beyond_the_linear_plate_is_outside_the_model() -> None:
 
 
 @pytest.mark.usefixtures("_undrawn")
+def test_the_time_step_is_judged_by_the_critical_one() -> None:
+    row = page(one=fecm.run_one(small())).row("time step")
+    assert row[1].text == "within range"
+    unstable = fecm.run_one(small().replace(".5E-6", "8.E-7"), force=True)
+    assert page(one=unstable).row("time step")[1].text == "outside the model"
+
+
+@pytest.mark.usefixtures("_undrawn")
+@pytest.mark.parametrize(("thickness", "word"), [(0.02, "doubtful"), (0.001, "within range")])
+def test_the_shear_stiffness_of_a_thick_laminate_is_doubtful(thickness: float, word: str) -> None:
+    deck = fecm.impact(
+        fecm.Plate.rectangle((1, 1), (2, 2), support="simple"),
+        fecm.Laminate("[0/90]s", fecm.Ply(1.0, 0.3, 25.0, 1.0, 0.5, 0.5, 0.2), thickness),
+        fecm.RigidMass(1.0),
+        fecm.Contact(1.0, 0.0, 0.0, 1.5),
+        velocity=1e-3,
+        duration=0.02,
+        kinematics="linear",
+        shear_factor=1.0,
+    )
+    assert page(one=fecm.run_one(deck)).row("transverse shear factor 1")[1].text == word
+
+
+@pytest.mark.usefixtures("_undrawn")
+@pytest.mark.parametrize(("most", "kind"), [(3, "svg+xml"), (2, "png")])
+def test_a_picture_of_more_bytes_than_allowed_is_made_of_pixels(
+    most: int, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fecm.report.figures.LARGEST", most)  # the picture's bytes are "svg"
+    html = render(page_of({"one": fecm.run_one(small())}))
+    assert set(re.findall(r"data:image/([a-z+]+);", html)) == {kind}
+
+
+@pytest.mark.usefixtures("_undrawn")
 def test_what_a_run_that_is_cut_off_has_not_reached_is_doubtful() -> None:
     row = page(one=fecm.run_one(failing(steps=6))).row("largest exposure")
     assert row[1].text == "doubtful"

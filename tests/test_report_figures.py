@@ -102,6 +102,18 @@ def test_the_rigidities_of_a_named_law_need_no_deck() -> None:
     )
 
 
+def test_the_picture_of_rigidities_has_the_indentation_along_and_the_rigidity_up() -> None:
+    from fecm.plot import rigidity_picture
+
+    peaks, units = np.array([1e-3, 2e-3, 4e-3]), {"length": "in", "force": "lbf"}
+    (axes,) = rigidity_picture(peaks, {"3-7": 1.0 / peaks}, 2.5, units).figure.axes
+    (line,) = axes.get_lines()
+    np.testing.assert_array_equal(line.get_xdata(), peaks)
+    np.testing.assert_array_equal(line.get_ydata(), 1.0 / peaks)
+    assert "Largest indentation" in axes.get_xlabel()
+    assert axes.get_ylim() == (0.0, 3.0 / 2e-3)
+
+
 @pytest.mark.parametrize(
     ("options", "what"),
     [

@@ -53,6 +53,7 @@ from fecm.mechanics import (
 )
 from fecm.mechanics.laminate import laminate
 from fecm.problem import load_deck, strengths_of_deck
+from fecm.results import ResultFileError
 from fecm.simulation import Solver
 from fecm.verification import decks
 from tests.builders import Floats, table
@@ -463,6 +464,14 @@ def test_plies_have_the_z_and_strains_of_each_elements_own_laminate() -> None:
     one, two, eps = (values[-1, 8, :, 0] for values in (found.sigma_1, found.sigma_2, found.eps_1))
     ply = HYBRID[0]  # material 2
     np.testing.assert_allclose(eps, (one - ply.nu12 * two) / ply.e1, rtol=1e-12)
+
+
+def test_a_result_whose_elements_have_a_laminate_that_its_deck_lacks_is_refused() -> None:
+    found = fecm.run_one(unlike())
+    arrays = {path: found[path] for path in found}
+    arrays["mesh/laminate"] = np.where(np.arange(16) == 2, 7, found["mesh/laminate"])
+    with pytest.raises(ResultFileError, match="does not have the laminates of its elements"):
+        Result(arrays, {"deck": found.deck_text}, {}).plies()
 
 
 @pytest.mark.parametrize(

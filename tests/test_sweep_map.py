@@ -179,6 +179,9 @@ def test_thresholds_of_different_plates_are_drawn_case_by_case() -> None:
     for line, forces in zip(drawn, limits, strict=True):
         np.testing.assert_allclose(data_of(line)[1], forces)
     assert "delamination threshold" in [line.get_label() for line in lines]
+    lower = sweep.summary | {"peak_force": 0.01 * sweep["peak_force"]}
+    below = SweepResult(sweep.cases, lower, sweep.dt, sweep.steps, units=sweep.units)
+    assert below["peak_force"].max() < limits.max() < plot(below).axes[0].get_ylim()[1]
     sweep = fecm.sweep(TOUGH, {"thickness": [0.1, 0.12], "velocity": [20.0, 200.0]})
     axes = plot(sweep).axes[0]
     low, high = (sweep["peak_force"] - sweep["threshold_force"]).reshape(2, 2).T

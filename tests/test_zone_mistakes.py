@@ -36,6 +36,25 @@ def findings(words: str) -> list[tuple[str, str, str]]:
     ]
 
 
+MATERIAL_2 = "    2\n.00003,.3,15000.,15000.,6000.,6000.,6000.\n"
+MATERIAL_1 = MATERIAL_2.replace("2", "1", 1)
+
+
+@pytest.mark.parametrize(
+    ("card", "wrong", "message", "at"),
+    [
+        ("    3    1\n", "    2    1\n", "The number 2 of a laminate is taken.", "2    1"),
+        (MATERIAL_2, 2 * MATERIAL_2, "The number 2 of a material is taken.", "2"),
+        (MATERIAL_2, MATERIAL_1 + MATERIAL_2, "The number 1 of a material is MATE's or less.", "1"),
+    ],
+    ids=["laminate twice", "material twice", "MATE's"],
+)
+def test_a_number_belongs_to_one_material_and_one_laminate(
+    card: str, wrong: str, message: str, at: str
+) -> None:
+    assert findings(WORDS.replace(card, wrong))[0] == ("E496", message, at)
+
+
 def test_the_cards_are_without_errors() -> None:
     assert findings(WORDS) == []
 

@@ -21,6 +21,7 @@ from fecm.plot.studies import dispersion_picture as dispersion_picture
 from fecm.plot.studies import fronts_picture as fronts_picture
 from fecm.plot.studies import indentation_fit_picture as indentation_fit_picture
 from fecm.plot.studies import pulse_picture as pulse_picture
+from fecm.plot.studies import rigidity_picture as rigidity_picture
 from fecm.plot.studies import speeds_picture as speeds_picture
 from fecm.plot.style import COLOURS as COLOURS
 from fecm.plot.style import scale as scale
