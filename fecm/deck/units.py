@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -80,6 +80,28 @@ def unit_of(dimension: str, names: dict[str, str]) -> str:
     if not names or not dimension:
         return ""
     return re.sub(r"length|force|time", lambda match: names[match[0]], dimension)
+
+
+# A unit or a dimension, and the columns that have it.
+_OF_COLUMNS = re.compile(r"(\S+) \(([^)]*)\)")
+
+
+def units_of_columns(unit: str, columns: Sequence[str]) -> list[str]:
+    """Return the unit of each column of an array; empty if one unit holds for all.
+
+    Examples
+    --------
+    >>> units_of_columns("mm (u, w), 1 (theta_x)", ["u", "w", "theta_x"])
+    ['mm', 'mm', '1']
+    >>> units_of_columns("mm", ["x", "y"])
+    []
+    """
+    units = {
+        name: unit_of_some
+        for unit_of_some, names in _OF_COLUMNS.findall(unit)
+        for name in names.split(", ")
+    }
+    return [units[name] for name in columns] if units else []
 
 
 def column_name(name: str, unit: str) -> str:

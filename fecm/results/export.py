@@ -13,7 +13,6 @@ n.
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Callable, Iterator, Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -26,7 +25,7 @@ from fecm._files import check_outputs, open_for_writing
 from fecm._text import Decimal, csv_lines
 from fecm._typing import Array
 from fecm.deck.mesh_cards import AXES, DOF_NAMES
-from fecm.deck.units import column_name
+from fecm.deck.units import column_name, units_of_columns
 from fecm.results import schema
 from fecm.results.criteria import criteria_of
 from fecm.results.exposures import LOWER_BOUNDS
@@ -34,7 +33,14 @@ from fecm.results.groups import ExportError, NotStoredError, remedy, stored_by, 
 from fecm.results.hdf5_writer import new_hdf5
 from fecm.results.plate_fields import Fields, Ints, Note, plate_fields, vtk_cells, vtk_points
 from fecm.results.plies import IN_PLANE, INTERLAMINAR, rows_at
-from fecm.results.schema import DATASETS, SCALES, Dataset, dataset_of
+from fecm.results.schema import (
+    AXIS_NAMES,
+    COLUMN_UNITS,
+    DATASETS,
+    SCALES,
+    Dataset,
+    dataset_of,
+)
 from fecm.results.stored import Stored
 
 if TYPE_CHECKING:
@@ -66,8 +72,6 @@ LABELS = {"gages": "gages/number", "members": "plies/element", "patch_nodes": "p
 # Datasets of the table of ply stresses.
 PLIES = tuple(f"plies/{name}" for name in (*IN_PLANE, *INTERLAMINAR))
 FAILURE = ("failure", "exposures")  # groups of FAIL
-# A unit and the components of a dataset that have it.
-OF_COMPONENTS = re.compile(r"(\S+) \(([^)]*)\)")
 HISTORY = "history"  # the group that is exported by default
 BLOCK = 100_000  # lines per block
 
@@ -153,14 +157,11 @@ def _components(names: Sequence[str], unit: str) -> tuple[str, ...]:
 
     `unit` applies to all components, or lists them: ``mm (u, v, w), 1 (theta_x, theta_y)``.
     """
-    shared = OF_COMPONENTS.findall(unit)
-    units = {
-        name: unit_of_members
-        for unit_of_members, members in shared
-        for name in members.split(", ")
-        if unit_of_members != "1"
-    }
-    return tuple(column_name(name, units.get(name, "") if shared else unit) for name in names)
+    units = units_of_columns(unit, names) or [unit] * len(names)
+    return tuple(
+        column_name(name, "" if of_name == "1" else of_name)
+        for name, of_name in zip(names, units, strict=True)
+    )
 
 
 def _in_rows(path: str) -> bool:
@@ -321,11 +322,17 @@ def datatree(stored: Stored) -> xarray.DataTree:
         import xarray  # optional
     except ImportError:
         raise ImportError("a DataTree needs xarray: pip install 'fecm[xarray]'") from None
-    groups: dict[str, dict[str, tuple[list[str], Array, dict[str, str]]]] = {}
+    groups: dict[str, dict[str, tuple[list[str], Array, dict[str, Sequence[str]]]]] = {}
     for path in stored:
         values = stored[path]
         dataset = dataset_of(path, values.ndim) or Dataset(path, values.shape, "")
-        texts = {"long_name": dataset.description, "units": stored.unit(path)}
+        unit = stored.unit(path)
+        columns = units_of_columns(unit, AXIS_NAMES.get(dataset.shape[-1], ())[: values.shape[-1]])
+        texts = {
+            "long_name": dataset.description,
+            "units": "" if columns else unit,
+            COLUMN_UNITS: columns,
+        }
         attributes = {name: text for name, text in texts.items() if text}
         groups.setdefault(dataset.group, {})[dataset.name] = (
             _axis_names(dataset),

@@ -16,7 +16,7 @@ import numpy as np
 
 from fecm._files import beside, check_outputs
 from fecm._typing import Array
-from fecm.deck.units import declared_units, unit_of
+from fecm.deck.units import declared_units, unit_of, units_of_columns
 from fecm.results import schema
 from fecm.results.criteria import criteria_of
 from fecm.results.groups import ResultWriteError
@@ -108,7 +108,12 @@ class FileSink:
         if dataset.dimension:
             _set_text(created, dataset.dimension, "dimension")
             if unit := unit_of(dataset.dimension, self._units):
-                _set_text(created, unit, "unit", "units")  # xarray and pint read units
+                names = self.axis_names.get(dataset.shape[-1], ())[: shape[-1]]
+                if columns := units_of_columns(unit, names):
+                    _set_text(created, unit, "unit")
+                    created.attrs.create(schema.COLUMN_UNITS, columns, (len(columns),), TEXT)
+                else:
+                    _set_text(created, unit, "unit", "units")  # xarray and pint read units
         self.arrays[dataset.path] = created
         self._made[dataset.path] = dataset, shape
 

@@ -68,6 +68,9 @@ def heading(form: Form, title: str) -> dict[str, Any]:
     }
 
 
+# Attribute of a dataset with columns of several units: the unit of each, instead of ``units``.
+COLUMN_UNITS = "column_units"
+
 ANY = "any"  # integers, numbers or texts: the type of the values
 NUMBERS = "numbers"  # integers or numbers
 TEXTS = "texts"
@@ -669,7 +672,7 @@ SCALES = {
     "steps": ("step", "number of time steps taken"),
     "combinations": ("combination", "number of the combination of varied values, from 0"),
     "laws": ("random_name", "name of the random value"),
-    "limits": ("limit", "number of the limit, from 1"),
+    "limits": ("limit_number", "number of the limit, from 1"),
     "statistics": ("statistic", "name of the statistic; percentages are quantiles"),
     "bounds": ("bound", "ends of the 95 % interval"),
     "candidates": ("candidate", "number of the candidate place"),
