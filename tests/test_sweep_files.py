@@ -57,6 +57,12 @@ def changed(swept: Path, tmp_path: Path) -> Callable[[str, object], Path]:
     return change
 
 
+def test_a_loaded_sweep_has_its_columns_in_the_order_of_the_sweep(tmp_path: Path) -> None:
+    result = fecm.sweep(small(), {"velocity": VELOCITIES})
+    result.save(tmp_path / "sweep.h5")
+    assert fecm.load_sweep(tmp_path / "sweep.h5").keys() == result.keys()
+
+
 def test_info_tells_the_cases_and_what_came_out(swept: Path) -> None:
     done = call("info", swept)
     assert (done.exit_code, done.stderr) == (0, "")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -17,7 +16,7 @@ from fecm.deck.model import Deck, Impact, Indentation, Projectile
 from fecm.deck.units import quantity, readable, unit_names, unit_of
 from fecm.identification.fitting import OF_RECORD
 from fecm.results.groups import NotStoredError
-from fecm.results.pictures import report_results
+from fecm.results.written import Reported
 
 CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
     **dict.fromkeys(("velocity", "energy"), Impact),
@@ -29,7 +28,7 @@ PLATE_ERRORS = "Change of the values with 1 % more of a property of the plate in
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class Identification(Reported):
     """Parameters of an impact, fitted to a measured force.
 
     Attributes
@@ -120,33 +119,9 @@ class Identification:
             raise NotStoredError(f"{name} was not fitted; there are {', '.join(self.values)}")
         return unit_of(OF_RECORD.get(name) or dimension_of(name), self.units)
 
-    def report(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write an HTML page like ``fecm identify --report``.
-
-        The page is one file with the verdict, the fitted values and their errors, pictures and the
-        deck.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write, ``.html``.
-        overwrite : bool
-            Replace an existing file.
-
-        Raises
-        ------
-        ReportError
-            If the name has another suffix.
-        FileExistsError
-            If the file exists and may not be replaced.
-        ImportError
-            If Jinja2 or matplotlib is not installed.
-
-        Examples
-        --------
-        >>> fit.report("impact.html")  # doctest: +SKIP
-        """
-        report_results({"the measurement": self}, path, overwrite=overwrite)
+    @property
+    def _name(self) -> str:
+        return "the measurement"
 
     def cards(self) -> str:
         """Return the cards of the deck with fitted values."""

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from fecm._arrays import read_only
 from fecm._errors import FecmError, OptionsError, ResultFileError
-from fecm._files import check_outputs
 from fecm._table import Row, Table, html_table, text_lines
 from fecm._text import FITTED_DIGITS
 from fecm._typing import AnyFile, Bools, Floats
@@ -23,6 +22,7 @@ from fecm.results import schema
 from fecm.results.groups import NotStoredError
 from fecm.results.pictures import plot_results
 from fecm.results.stored import deck_in
+from fecm.results.written import Saved
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -94,7 +94,7 @@ class Candidate(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Location:
+class Location(Saved):
     """Place and force history of an impact, located from strain gages.
 
     Standard deviations have two parts. The first is the Cramér-Rao bound for independent errors of
@@ -296,27 +296,9 @@ class Location:
         """
         return plot_results("location", {"the impact": self}, path, None, overwrite=overwrite)
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write a file like ``fecm locate -o``; :func:`fecm.load_location` reads it.
-
-        Parameters
-        ----------
-        path : str or Path
-            HDF5 file to write.
-        overwrite : bool
-            Replace an existing file.
-
-        Raises
-        ------
-        FileExistsError
-            If the file exists and may not be replaced.
-        ResultWriteError
-            If it can't be written.
-        """
+    def _write(self, path: Path, *, overwrite: bool) -> None:
         from fecm.results.hdf5_writer import result_writing  # h5py takes 60 ms to import
 
-        path = Path(path)
-        check_outputs([path], overwrite)
         attributes = {
             "locate": self._place_attributes(),
             "locate/force": self._known_attributes(*OF_FORCE, *OPTIONAL),

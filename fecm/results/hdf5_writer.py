@@ -14,7 +14,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from fecm._files import beside, check_outputs
+from fecm._files import beside
 from fecm._typing import Array
 from fecm.deck.units import declared_units, unit_of, units_of_columns
 from fecm.results import schema
@@ -253,7 +253,6 @@ def result_writing(
 
 def save_result(stored: Stored, path: Path, *, overwrite: bool) -> None:
     """Write a result as a file; see :meth:`fecm.Result.save`."""
-    check_outputs([path], overwrite)
     with result_writing(path, overwrite=overwrite) as sink:
         sink.axis_names["criteria"] = criteria_of(stored.attributes_of("failure"))
         sink.attributes("", stored.attributes)

@@ -1,4 +1,4 @@
-"""Pictures and report of a result of a run or a sweep, drawn by upper rooms."""
+"""Pictures of results, drawn by an upper room."""
 
 from __future__ import annotations
 
@@ -41,9 +41,3 @@ def plot_results(
     """Draw results by their names in the legend; see :func:`fecm.plot.pictures.draw_results`."""
     axes: Axes = function_of("Result.plot")(kind, results, path, ax, overwrite=overwrite, **options)
     return axes
-
-
-def report_results(results: Mapping[str, Any], path: str | Path, *, overwrite: bool) -> None:
-    """Write the page about results by their names; see :func:`fecm.report.report.write_report`."""
-    write_report = function_of("Result.report")
-    write_report(results, Path(path), overwrite=overwrite)

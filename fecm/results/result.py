@@ -17,6 +17,7 @@ from fecm.results.groups import GROUPS, NotStoredError, ResultGroup, not_stored
 from fecm.results.metrics import METRICS, MetricAttributes
 from fecm.results.run_metrics import ImpactMetrics, end_of, metrics_of
 from fecm.results.stored import Stored
+from fecm.results.written import Reported, Saved
 
 if TYPE_CHECKING:
     import pandas
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from fecm.results.plies import PlyGroup
 
 
-class Result(Stored, schema.ContactRows, MetricAttributes):
+class Result(Stored, Saved, Reported, schema.ContactRows, MetricAttributes):
     """Result of a run.
 
     Every dataset is available as ``result["tape3/w"]`` and ``result.tape3.w``; the columns of the
@@ -183,31 +184,14 @@ class Result(Stored, schema.ContactRows, MetricAttributes):
 
         return pyvista_grid(self, time)
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write the result as a file, such as one of a run in memory.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write.
-        overwrite : bool
-            Replace an existing file.
-
-        Raises
-        ------
-        FileExistsError
-            If the file exists and may not be replaced.
-        OSError
-            If it can't be written.
-
-        Examples
-        --------
-        >>> import fecm
-        >>> fecm.run_one("decks/appendix.inp").save("appendix.h5", overwrite=True)
-        """
+    def _write(self, path: Path, *, overwrite: bool) -> None:
         from fecm.results.hdf5_writer import save_result  # h5py takes 30 ms
 
-        save_result(self, Path(path), overwrite=overwrite)
+        save_result(self, path, overwrite=overwrite)
+
+    @property
+    def _name(self) -> str:
+        return self.title or "the result"
 
     def export(
         self,
@@ -305,37 +289,7 @@ class Result(Stored, schema.ContactRows, MetricAttributes):
         """
         from fecm.results.pictures import plot_results  # which a run does not need
 
-        named = {self.title or "the result": self}
-        return plot_results(kind, named, path, ax, overwrite=overwrite, **options)
-
-    def report(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write an HTML page to hand on, as ``fecm report`` does.
-
-        The page is one file: verdict, validity, numbers, pictures, model, checksums and deck.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write, ``.html``.
-        overwrite : bool
-            Replace an existing file.
-
-        Raises
-        ------
-        ReportError
-            If the name has another suffix.
-        FileExistsError
-            If the file exists and may not be replaced.
-        ImportError
-            If Jinja2 or matplotlib is not installed.
-
-        Examples
-        --------
-        >>> result.report("impact.html")  # doctest: +SKIP
-        """
-        from fecm.results.pictures import report_results  # which a run does not need
-
-        report_results({self.title or "the result": self}, path, overwrite=overwrite)
+        return plot_results(kind, {self._name: self}, path, ax, overwrite=overwrite, **options)
 
     def compare(
         self,

@@ -21,7 +21,8 @@ from fecm.deck.units import declared_units, unit_names
 from fecm.mechanics.own_law import law_name
 from fecm.results import schema
 from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VERDICTS
-from fecm.results.pictures import SweepKind, plot_results, report_results
+from fecm.results.pictures import SweepKind, plot_results
+from fecm.results.written import Reported, Saved
 from fecm.sweeps import reduced as reduced_check
 from fecm.sweeps.files import FORCE, random_of
 from fecm.sweeps.outcome import About, Column, Outcome
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
 LATER = {"contact_loop"}  # results of every case that earlier files lack
 
 
-class SweepResult(StoredSweep):
+class SweepResult(StoredSweep, Saved, Reported):
     """Result of a sweep.
 
     Attributes
@@ -99,35 +100,14 @@ class SweepResult(StoredSweep):
             texts[-1] += f": {reasons(self['status'][~self.completed])}"
         return (*texts, *remarks(self), *(() if self.random is None else self.random.notes))
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write the result as a file, which :func:`fecm.load_sweep` and the command line read.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write.
-        overwrite : bool
-            Replace an existing file.
-
-        Raises
-        ------
-        FileExistsError
-            If the file exists and may not be replaced.
-        OSError
-            If it can't be written.
-
-        Examples
-        --------
-        >>> import fecm
-        >>> result = fecm.sweep("decks/impact-115.inp", {"velocity": [50.0, 115.0]})
-        >>> result.save("velocities.h5", overwrite=True)
-        >>> fecm.load_sweep("velocities.h5").keys() == result.keys()
-        True
-        """
+    def _write(self, path: Path, *, overwrite: bool) -> None:
         from fecm.sweeps.files import save_sweep  # h5py takes 60 ms to import
 
-        check_outputs([Path(path)], overwrite)
-        save_sweep(self, Path(path), overwrite=overwrite)
+        save_sweep(self, path, overwrite=overwrite)
+
+    @property
+    def _name(self) -> str:
+        return self.title or "the sweep"
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return values and results as a table with one row per case (requires pandas).
@@ -300,39 +280,11 @@ class SweepResult(StoredSweep):
         >>> result.plot(quantity="max_indentation", over="velocity")  # doctest: +SKIP
         """
         names = (over,) if isinstance(over, str) else tuple(over)
-        named = {self.title or "the sweep": self}
         if names or kind == "map":
             options["over"] = names
         return plot_results(
-            kind, named, path, ax, overwrite=overwrite, quantity=quantity, **options
+            kind, {self._name: self}, path, ax, overwrite=overwrite, quantity=quantity, **options
         )
-
-    def report(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write an HTML page to hand on, as ``fecm report`` does.
-
-        The page is one file: verdict, varied values, numbers, pictures, deck.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write, ``.html``.
-        overwrite : bool
-            Replace an existing file.
-
-        Raises
-        ------
-        ReportError
-            If the name has another suffix.
-        FileExistsError
-            If the file exists and may not be replaced.
-        ImportError
-            If Jinja2 or matplotlib is not installed.
-
-        Examples
-        --------
-        >>> result.report("impact.html")  # doctest: +SKIP
-        """
-        report_results({self.title or "the sweep": self}, path, overwrite=overwrite)
 
 
 def _grid(cases: Mapping[str, Column], count: int) -> tuple[dict[str, Column], NDArray[np.intp]]:
@@ -426,11 +378,11 @@ def sweep_of(contents: FileContents, *, history: bool = True) -> SweepResult:
     cases, summary = _group(contents, "cases/"), _group(contents, "summary/")
     required_names = ("dt", "steps", "unsettled_steps")
     steps = {n: contents[f"history/{n}"] for n in required_names if f"history/{n}" in contents}
-    names = (*SUMMARY, "status")
-    required = {*names} - LATER
+    required = {*SUMMARY, "status"} - LATER
     if not (summary.keys() >= required and steps.keys() >= {"dt", "steps"}):
         raise ResultFileError(f"{path}: the result of the sweep is incomplete")
-    summary = {name: summary[name] for name in names if name in summary} | summary  # in order
+    # Texts come last, as in the result that was written.
+    summary = {name: summary[name] for name in SUMMARY if name in summary} | summary
     groups = ("history/", "cases/", "summary/", "measured/")
     if first_misfit(contents, [dataset for dataset in contents if dataset.startswith(groups)]):
         message = f"{path}: the data of this sweep do not match in type or number of cases"
