@@ -403,6 +403,9 @@ def test_the_summary_has_impact_kinematics_cure_and_threshold() -> None:
     ):
         assert line in lines
     assert "delamination        at the latest from " in lines
+    several = re.sub(r"DELA\n.*", "DELA\n.5,7", deck.to_text())
+    lines = "\n".join(deck_summary(load_deck(several).problems[0]).lines())
+    assert re.search("delamination        from .* N .7 delaminations", lines)
 
 
 def test_the_coupling_of_a_symmetric_laminate_is_printed_as_zero() -> None:

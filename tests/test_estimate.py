@@ -30,6 +30,7 @@ def deck(segments: str = "", *, mesh: str = MESH) -> str:
 
 def test_the_row_of_the_run_is_the_run(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(deck("DELA\n.001,\n"))
+    assert "delamination at the latest from these" in call("estimate", "d.inp", cwd=tmp_path).stdout
     done = call("estimate", "d.inp", "--format", "json", cwd=tmp_path)
     assert done.exit_code == 0
     found = json.loads(done.stdout)

@@ -45,6 +45,7 @@ def test_the_peak_of_a_power_law_is_found_to_1e_6() -> None:
 def test_a_run_at_the_found_velocity_has_the_threshold_as_its_peak(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(deck(400))
     done = call("sweep", "d.inp", *FIND, "peak_force=threshold", "-o", "s.h5", cwd=tmp_path)
+    assert "delamination      at the latest from these energies" in done.stdout
     assert done.exit_code == 0
     found = fecm.load_sweep(tmp_path / "s.h5")
     (velocity,) = found["found_velocity"]

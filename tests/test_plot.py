@@ -366,27 +366,30 @@ def test_force_draws_the_delamination_threshold_if_there_is_one(result: Result) 
         for value in (4.0, 1.0)
     )
     figure = plot(tough, "force")
-    assert legend_of(figure)[-1] == f"delamination threshold {tough.threshold['force']:.4g} lbf"
+    assert (
+        legend_of(figure)[-1]
+        == f"delamination at the latest from {tough.threshold['force']:.4g} lbf"
+    )
     line = figure.axes[0].get_lines()[-1]
     assert line.get_ydata() == pytest.approx([tough.threshold["force"]] * 2)
     figure = draw("force", {"none": result, "tough": tough, "weak": weak}).figure
     labels = [
-        f"{name}: delamination threshold {one.threshold['force']:.4g} lbf"
+        f"{name}: delamination at the latest from {one.threshold['force']:.4g} lbf"
         for name, one in (("tough", tough), ("weak", weak))
     ]
     assert legend_of(figure) == ["none", "tough", "weak", *labels]
     first, second = (lines(figure.axes[0])[label][1][0] for label in labels)
     assert first == pytest.approx(2.0 * second)  # the square root of G_IIc
     same = draw("force", {"none": result, "a": weak, "b": weak}).figure
-    assert [text.partition(" thre")[0] for text in legend_of(same)] == [
+    assert [text.partition(" at the")[0] for text in legend_of(same)] == [
         "none",
         "a",
         "b",
         "a, b: delamination",
     ]
     all_weak = draw("force", {"a": weak, "b": weak}).figure
-    assert legend_of(all_weak)[2].startswith("delamination threshold")
-    assert "delamination threshold" not in legend_of(plot(result, "force"))
+    assert legend_of(all_weak)[2].startswith("delamination at the latest from")
+    assert not any("delamination" in text for text in legend_of(plot(result, "force")))
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, "high", None])

@@ -18,7 +18,7 @@ from fecm import Result
 from fecm._table import Table
 from fecm.deck import layup_text, parse_layup
 from fecm.report import page_of, render
-from fecm.results import ALL_CRITERIA, METRICS, first_failures
+from fecm.results import ALL_CRITERIA, METRICS, first_failures, run_summary
 from tests.calls import assert_unusable, call
 from tests.decks import LONG, ROOT, small
 from tests.pages import Page, agrees, read_page
@@ -83,8 +83,8 @@ def test_a_reader_of_the_page_alone_learns_what_happened(failed: Result, shown: 
         f"peak force {failed.force.max():.4g}",
         "(elastic prediction; delamination is expected at the latest from 26.57, and the first ply "
         "fails before)",
-        "passes the delamination threshold of",
-        "when the projectile has given up",
+        "passes the delamination threshold (delamination at the latest from 26.57) when the "
+        "projectile has given up",
         f"first failure: {first.mode} ({first.criterion.replace('_', ' ')}), {first.where}",
         "doubtful",
         "elements per bending wave",
@@ -94,6 +94,21 @@ def test_a_reader_of_the_page_alone_learns_what_happened(failed: Result, shown: 
     ):
         assert said.lower() in text.lower(), said
     assert all(note in text for note in failed.notes)
+
+
+def test_a_criterion_that_reaches_1_below_the_threshold_is_named_beside_it(failed: Result) -> None:
+    tough = LIGHT.replace(".02", ".07")  # the threshold grows as the square root
+    before = fecm.run_one(failing(steps=160).replace("EXPE", tough, 1))
+    first = min(first_failures(before), key=lambda failure: failure.force)
+    force = float(before.threshold["force"])
+    assert float(failed.threshold["force"]) < first.force < force < before.force.max()
+    text = f"{first.criterion.replace('_', ' ')} reaches 1 before, at {first.force:.4g}"
+    assert f"for one delamination, as in DELA; {text})" in "\n".join(run_summary(before))
+    assert (
+        f"(delamination at the latest from {force:.4g}; {text})"
+        in page_of({"run": before}).verdict[0]
+    )
+    assert "reaches 1 before" not in "\n".join(run_summary(failed))
 
 
 def test_verdict_and_table_of_a_page_name_one_ply_for_the_first_failure(failed: Result) -> None:

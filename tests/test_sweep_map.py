@@ -143,7 +143,7 @@ def legend_of(figure: Any) -> list[str]:
 def test_the_legend_names_thresholds_and_levels_with_their_values() -> None:
     sweep = fecm.sweep(TOUGH, {"velocity": [20.0, 200.0], "k": [1e6, 3e6]})
     force = sweep["threshold_force"][0]
-    named = f"delamination threshold {force:.4g} lbf"
+    named = f"delamination at the latest from {force:.4g} lbf"
     assert legend_of(plot(sweep)) == [named]
     row = plot(sweep, over="velocity", where={"k": 1e6}, level=(50.0,))
     assert legend_of(row) == ["level 50 lbf", named]

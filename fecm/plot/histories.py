@@ -17,6 +17,7 @@ from fecm.plot.kinds import Against, Face, Picture, PlotError, Width
 from fecm.results.comparison import Source, compare_force, measurement_of
 from fecm.results.result import Result
 from fecm.results.run_metrics import start_w_of
+from fecm.results.validity import from_threshold
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -105,7 +106,7 @@ def force(
         for name, result in results.items()
     }
     times = [forces.time for forces in drawn.values()]
-    limits = _thresholds(results)
+    limits, words = _thresholds(results)
     sizes = [values for forces in drawn.values() for values in (forces.contact, forces.transducer)]
     sizes.append(np.array(list(limits.values())))
     measured = None
@@ -116,7 +117,7 @@ def force(
     pound = style.scale_of(results, "force", sizes)
 
     figure, axes = _draw_forces(drawn, pound, width, _of_whole(results))
-    _mark_thresholds(axes[0], limits, list(drawn), pound)
+    _mark_thresholds(axes[0], limits, words, list(drawn), pound)
     time_axis(axes[-1], style.scale_of(results, "time", times), times)
     _mark_open_ends(axes[0], results, width)
     notes = []
@@ -171,7 +172,11 @@ def _of_whole(results: Results) -> str:
 
 
 def _mark_thresholds(
-    axes: Axes, limits: Mapping[str, float], names: Sequence[str], pound: style.AxisScale
+    axes: Axes,
+    limits: Mapping[str, float],
+    words: Mapping[str, str],
+    names: Sequence[str],
+    pound: style.AxisScale,
 ) -> None:
     """Draw thresholds, and name their results unless all share one threshold."""
     colours = dict(zip(names, style.colours(), strict=False))
@@ -183,7 +188,7 @@ def _mark_thresholds(
             ls=style.DASHED,
             lw=0.8,
             color=colours[owners[0]] if whose else "0.3",
-            label=f"{whose}delamination threshold {pound.show(limit)}",
+            label=f"{whose}delamination {words[owners[0]]} {pound.show(limit)}",
         )
 
 
@@ -213,16 +218,18 @@ def force_fit_picture(fit: Identification, units: Mapping[str, str]) -> Picture:
     return Picture(figure)
 
 
-def _thresholds(results: Results) -> dict[str, float]:
-    """Return the delamination thresholds by the names of the results that have one."""
+def _thresholds(results: Results) -> tuple[dict[str, float], dict[str, str]]:
+    """Return delamination thresholds, and the words before them, by the names of results."""
     values: dict[str, float] = {}
+    words: dict[str, str] = {}
     for name, result in results.items():
         if result.threshold:
             value = result.threshold.get("force")
             if not isinstance(value, int | float) or not 0.0 < value <= data.LARGEST:
                 raise PlotError(f"{name} has a delamination threshold that can't be drawn: {value}")
             values[name] = value
-    return values
+            words[name] = from_threshold(result.threshold.get("number"))
+    return values, words
 
 
 def loop(results: Results, *, against: Against | None = None, width: Width = "column") -> Picture:

@@ -27,6 +27,7 @@ from fecm.plot.sweep_data import (
     variable_of,
 )
 from fecm.sweeps.result import SweepResult
+from fecm.sweeps.summary import from_threshold_of
 
 if TYPE_CHECKING:
     from matplotlib import collections
@@ -45,12 +46,8 @@ class MarkedLevel(NamedTuple):
     """Value of the quantity that is marked."""
 
     value: float
+    words: str = "level"  # before the value in the legend
     is_threshold: bool = False  # of delamination
-
-    @property
-    def name(self) -> str:
-        """Name of the value in the legend."""
-        return THRESHOLD if self.is_threshold else "level"
 
 
 class MapContents(NamedTuple):
@@ -122,7 +119,8 @@ def choose(
         thresholds = sweep["threshold_force"][rows]
         highest = float(np.nanmax(thresholds))
         if highest - np.nanmin(thresholds) <= 1e-9 * highest:
-            levels[highest] = MarkedLevel(highest, is_threshold=True)
+            words = f"delamination {from_threshold_of(sweep)}"
+            levels[highest] = MarkedLevel(highest, words, is_threshold=True)
             thresholds = np.empty(0)
     low, high = shown.range
     for value in level:
@@ -344,15 +342,17 @@ def name_levels(graph: Graph, contents: MapContents) -> list[str]:
     in_cells = value_grid(graph.x, graph.y, shown.values) is not None
     lowest = min((level.value for level in contents.levels), default=0.0)
     for level in contents.levels:
-        text = f"{level.name} {shown.scale.show(level.value)}"
+        value = shown.scale.show(level.value)
+        text = f"{level.words} {value}"
         inside = low < level.value < high
         if inside and in_cells:
             name_level(graph, text)
         elif inside and level.value == lowest:
-            graph.axes.plot([], [], "o", label=f"from {text} on", **RING)
+            ring = text if level.is_threshold else f"from {text} on"
+            graph.axes.plot([], [], "o", label=ring, **RING)
         elif not inside and level.is_threshold:
             side = "below" if high <= level.value else "above"
-            notes.append(f"all values of {shown.name} are {side} the {text}")
+            notes.append(f"all values of {shown.name} are {side} the {THRESHOLD} {value}")
     return notes
 
 
@@ -410,7 +410,7 @@ def _finish(graph: Graph, contents: MapContents) -> None:
     along_x = graph.x is shown
     graph.label()
     for level in contents.levels:
-        look = LEVEL | {"label": f"{level.name} {shown.scale.show(level.value)}"}
+        look = LEVEL | {"label": f"{level.words} {shown.scale.show(level.value)}"}
         if not level.is_threshold:
             look["linestyle"] = style.DOTTED
         if along_x:

@@ -29,6 +29,7 @@ from fecm.problem.estimates import MOST_SOLVED, format_mesh_error, resolution
 from fecm.problem.problem import Problem
 from fecm.problem.rules.preload import FEWEST_ELEMENTS
 from fecm.results.stored import whole_plate
+from fecm.results.validity import from_threshold
 
 ROOM = 0.6  # share of the critical time step below which the step that DT 0 takes is shown
 LABEL_WIDTH = 20  # of the lines of a summary, at least
@@ -140,6 +141,8 @@ class ProblemSummary:
         Change of temperature of CURE, kelvin; None without CURE.
     threshold : float or None
         Delamination threshold, force; None without one.
+    delaminations : int
+        Number of delaminations at the threshold; 0 without one.
     symmetry_factor : int
         Number of equal parts of the plate of which the deck has one: 1, 2 or 4. Masses and energy
         are of the whole plate.
@@ -181,6 +184,7 @@ class ProblemSummary:
     energy: FiniteFloat | None
     cure: FiniteFloat | None
     threshold: FiniteFloat | None
+    delaminations: int
     symmetry_factor: int
     symmetry_lines: str
 
@@ -254,7 +258,9 @@ def _plate_rows(summary: ProblemSummary) -> Iterator[Row]:
     if summary.cure is not None:
         yield ("cure", f"{summary.cure:+g} K")
     if summary.threshold is not None:
-        yield ("delamination", f"at the latest from {in_units(summary.threshold, 'force')}")
+        words, count = from_threshold(summary.delaminations), summary.delaminations
+        of_several = f" ({count} delaminations)" if count > 1 else ""
+        yield ("delamination", f"{words} {in_units(summary.threshold, 'force')}{of_several}")
 
 
 def _impact_rows(summary: ProblemSummary) -> Iterator[Row]:
@@ -356,6 +362,7 @@ def deck_summary(problem: Problem) -> ProblemSummary:
         energy=None if velocity is None else 0.5 * mass * velocity * velocity,
         cure=None if cure is None else cure.delta_t,
         threshold=None if problem.threshold is None else problem.threshold.force,
+        delaminations=0 if problem.threshold is None else problem.threshold.number,
         symmetry_factor=problem.symmetry.factor,
         symmetry_lines=problem.symmetry.places,
     )

@@ -47,9 +47,11 @@ from fecm.results.summary import (
     UNDECIDED,
     elastic_doubt,
     later_contact,
+    lowest_criterion,
     radii_of,
     run_table,
 )
+from fecm.results.validity import from_threshold
 
 WORDS = {
     TrustLevel.WITHIN: "All quantities are within the range of the model.",
@@ -196,19 +198,19 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     else:
         parts.append("there was no contact")
     if result.threshold:
-        limit = float(result.threshold["force"])
+        limit = in_units(float(result.threshold["force"]), "force")
+        at_the_latest = from_threshold(result.threshold.get("number"))
+        named = "; ".join([f"delamination {at_the_latest} {limit}", *lowest_criterion(result)])
         if math.isfinite(float(result.threshold["time"])):
             energy = in_units(threshold_energy(result), "force*length")
             parts.append(
-                f"passes the delamination threshold of {in_units(limit, 'force')} when the "
-                f"projectile has given up {energy} (fecm sweep DECK --find velocity --until "
+                f"passes the delamination threshold ({named}) when the projectile has given up "
+                f"{energy} (fecm sweep DECK --find velocity --until "
                 "peak_force=threshold finds the impact energy that reaches it)"
             )
         else:
             ends = " by the end of the run" if result.end in UNDECIDED else ""
-            parts.append(
-                f"stays below the delamination threshold of {in_units(limit, 'force')}{ends}"
-            )
+            parts.append(f"stays below the delamination threshold ({named}){ends}")
     if first := first_failures(result)[:1]:
         failure = first[0]
         text = f"first failure: {failure.mode} ({spelt(failure.criterion)}), {failure.where}"
@@ -306,8 +308,9 @@ def _threshold(result: Result) -> list[PageBlock]:
     if not threshold:
         return []
     unit = unit_of("force", result.units)
+    words = from_threshold(threshold.get("number"))
     rows: list[Row] = [
-        ("threshold force", number_with_unit(float(threshold["force"]), unit)),
+        (f"delamination {words}", number_with_unit(float(threshold["force"]), unit)),
         ("number of delaminations", str(threshold.get("number", UNKNOWN))),
     ]
     if np.shape(threshold.get("band", 0)) == (2,):

@@ -33,7 +33,7 @@ from fecm.results.validity import MEANING, Reason, counted
 from fecm.sweeps.random import Design
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.statistics import QUANTILES, RandomResult
-from fecm.sweeps.summary import MAIN, chance, sweep_verdict, symmetry_text
+from fecm.sweeps.summary import MAIN, chance, sweep_verdict, symmetry_text, threshold_text
 
 FOUND = "found_velocity"
 PEAK = "peak_force"
@@ -92,6 +92,8 @@ def _sentences(sweep: SweepResult) -> Iterator[str]:
             else ""
         )
         yield f"{what.replace('_', ' ').capitalize()}: {' to '.join(ends)}{where}."
+    if text := threshold_text(sweep):
+        yield f"Delamination: {text}."
 
 
 def _fine(sweep: SweepResult, name: str) -> np.ndarray:

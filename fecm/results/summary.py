@@ -30,7 +30,7 @@ from fecm.results.metrics import INITIAL_PLATE
 from fecm.results.run_metrics import end_of, impact_energy, metrics_of, start_w_of
 from fecm.results.schema import DATASETS
 from fecm.results.stored import Stored, row_blocks, whole_plate
-from fecm.results.validity import CROSSED
+from fecm.results.validity import CROSSED, from_threshold
 
 if TYPE_CHECKING:
     from fecm.results.exposures import FirstFailure
@@ -151,8 +151,6 @@ def _range(contents: FileContents, path: str) -> tuple[float | None, float | Non
     return (minimum, maximum, not_finite) if minimum <= maximum else (None, None, not_finite)
 
 
-# Start of a threshold of one delamination: more delaminations, and bending cracks, come before.
-AT_THE_LATEST = "at the latest from"
 NEAR = 0.05  # distance of a row from the peak, over its time, that counts as the peak
 LISTED = 6  # most contacts and frequencies listed individually
 # Parts by the caller of the run: attribute, name, and the segment of the deck that they replace.
@@ -302,12 +300,12 @@ def _delaminations(result: Stored) -> str:
     other_counts.pop(int(number), None)
     count = "one delamination" if number == 1 else f"{number} delaminations"
     texts = [f"{force} for {'one' if n == 1 else n}" for n, force in other_counts.items()]
-    texts += _lowest_criterion(result)
+    texts += lowest_criterion(result)
     return f" ({'; '.join([f'for {count}, as in DELA', *texts])})"
 
 
-def _lowest_criterion(result: Stored) -> list[str]:
-    """Return a text about the criterion that reaches 1 at a lower force than the threshold."""
+def lowest_criterion(result: Stored) -> list[str]:
+    """Return a text about the criterion that reaches 1 below the threshold, if there is one."""
     first = [f for f in _first_failures(result) if f.force < float(result.threshold["force"])]
     if not first:
         return []
@@ -416,8 +414,7 @@ def _delamination(result: Stored) -> str:
         _quantity(result, float(threshold["force"]), "force"),
         float(threshold["time"]),
     )
-    if int(threshold.get("number", 0)) == 1:  # the highest threshold of any number
-        force = f"{AT_THE_LATEST} {force}"
+    force = f"{from_threshold(threshold.get('number'))} {force}"
     if math.isfinite(crossing):
         return f"{force}, reached at time {_quantity(result, crossing, 'time')}"
     if (end := end_of(result)) in UNDECIDED:
@@ -556,9 +553,9 @@ def elastic_doubt(result: Stored, peak: float) -> str:
     """Say why a peak force is only an elastic prediction; empty if it may be real."""
     beyond = []
     if result.threshold and peak > CROSSED * (force := float(result.threshold["force"])):
-        at_the_latest = AT_THE_LATEST if int(result.threshold.get("number", 0)) == 1 else "from"
+        words = from_threshold(result.threshold.get("number"))
         limit = _quantity(result, force, "force")
-        beyond.append(f"delamination is expected {at_the_latest} {limit}")
+        beyond.append(f"delamination is expected {words} {limit}")
     if any(exposure.exposure > CROSSED for exposure in largest_exposures(result)):
         beyond.append("the first ply fails before")
     return f"elastic prediction; {', and '.join(beyond)}" if beyond else ""

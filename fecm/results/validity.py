@@ -22,11 +22,21 @@ TOO_SOFT = "a linear plate, without membrane stiffening, is too soft"
 # The errors hold for plates without preload.
 PRELOADED = "compressive preload increases this error, tensile preload reduces it"
 REMEDY = "NONL includes the stiffening (fecm new --nonlinear)"
+# Start of a threshold of one delamination: more delaminations, and bending cracks, come before.
+AT_THE_LATEST = "at the latest from"
 UNSAFE = "threshold energies are therefore too high (unsafe)"
 CURVED = (
     "these figures are for a flat plate: a curved panel that is struck on its convex side softens "
     "and may snap through"
 )
+
+
+def from_threshold(delaminations: object) -> str:
+    """Return the words before the threshold force, or energy, of a number of delaminations.
+
+    The number comes from a file and may be damaged.
+    """
+    return AT_THE_LATEST if np.array_equal(np.asarray(delaminations), 1) else "from"
 
 
 class InPlane(StrEnum):

@@ -14,7 +14,7 @@ from fecm.problem.loading import sole_problem
 from fecm.problem.problem import Problem
 from fecm.results.metrics import RATIO
 from fecm.results.stored import whole_plate
-from fecm.results.validity import TOO_SOFT, Judge, unsafe
+from fecm.results.validity import AT_THE_LATEST, TOO_SOFT, Judge, from_threshold, unsafe
 from fecm.studies.estimate import INFINITE_PLATE, LARGE, SMALL, QuickEstimate
 from fecm.studies.estimate import quick_estimate as by_quick_models
 from fecm.sweeps.execute import carry_out_plan
@@ -219,6 +219,10 @@ def estimate_problem(problem: Problem) -> Estimate:
         remarks["preload"] = "in the static plate and the run: the infinite plate neglects PREL"
     if problem.plate.is_curved:
         remarks["curvature"] = "in the static plate and the run: the infinite plate is flat"
+    if problem.threshold is not None:
+        words = from_threshold(problem.threshold.number)
+        first = "; plies and interfaces may fail before" if words == AT_THE_LATEST else ""
+        remarks["threshold"] = f"delamination {words} these forces and energies{first}"
     if quick.remark:
         remarks["stretching"] = quick.remark
     return Estimate(

@@ -13,19 +13,21 @@ from fecm._table import Row, label_lines
 from fecm._text import DIGITS, significant
 from fecm._typing import Bools
 from fecm.authoring.case import THRESHOLD, pair_of_text
-from fecm.deck.model import Curvature, Preload, Segment
+from fecm.deck.model import Curvature, Delamination, Preload, Segment
 from fecm.deck.units import column_name, quantity
 from fecm.problem.generate import generate
 from fecm.problem.symmetry import symmetry_of
 from fecm.results.exposure_bands import is_bounded
-from fecm.results.metrics import FACTOR, FOUND_BAND, RATIO
+from fecm.results.metrics import FACTOR, FOUND_BAND, RATIO, THRESHOLD_FORCE
 from fecm.results.stored import whole_plate
 from fecm.results.validity import (
+    AT_THE_LATEST,
     BENT,
     MEANING,
     TOO_SOFT,
     InPlane,
     counted,
+    from_threshold,
     in_plane_of,
     softness,
     unsafe,
@@ -39,6 +41,7 @@ GIVEN = 6  # digits of the values of a case, unless others are closer
 MOST_REASONS = 5  # of failure, that the summary lists
 WEIGHED = ("mass", "rod_mass", "energy")  # values that the summary shows in g and J
 WIDE = 0.75  # share of an energy found that finer meshes leave if the load is resolved
+SAME_FORCE = 1e-4  # distance of a force found from the threshold, relative to the threshold
 SAME_PLACE = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
 
 
@@ -59,6 +62,8 @@ def sweep_rows(result: StoredSweep) -> list[Row]:
     if text := symmetry_text(result):
         rows.append(("symmetry", text))
     rows += [*_extremes(result), *_moved(result)]
+    if text := threshold_text(result):
+        rows.append(("delamination", text))
     for reason, times in failed.most_common(MOST_REASONS):
         rows.append(("failed", f"{times}: {reason}"))
     if (more := len(failed) - MOST_REASONS) > 0:
@@ -107,6 +112,28 @@ def _found_band(result: StoredSweep, case: int) -> str:
         return "; finer meshes not bounded"
     unit = result.unit("found_energy")
     return f"; finer meshes {quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
+
+
+def from_threshold_of(result: StoredSweep) -> str:
+    """Return the words before the delamination threshold of a sweep."""
+    try:
+        card = result.deck.last(Delamination)
+    except ResultFileError:  # of a damaged file
+        return from_threshold(0)
+    return from_threshold(0 if card is None else int(card.number))
+
+
+def threshold_text(result: StoredSweep) -> str:
+    """Say what the energies found at the threshold are; empty for other sweeps and searches."""
+    if not {"found_energy", THRESHOLD_FORCE} <= result.summary.keys():
+        return ""
+    ratio = result["peak_force"][result.completed] / result[THRESHOLD_FORCE][result.completed]
+    if not (np.abs(ratio - 1.0) < SAME_FORCE).all() or from_threshold_of(result) != AT_THE_LATEST:
+        return ""
+    return (
+        f"{AT_THE_LATEST} these energies, which are for one delamination; plies and interfaces may "
+        "fail before (--until exposure=1, with FAIL)"
+    )
 
 
 def _moved(result: StoredSweep) -> Iterator[Row]:
