@@ -34,7 +34,7 @@ from fecm.authoring.case import Case, Value
 from fecm.authoring.cases import parse_vary
 from fecm.authoring.values import apply_case
 from fecm.mechanics import kernels
-from fecm.sweeps.backends import _plate
+from fecm.sweeps.methods import _plate
 
 DECK = HERE.parent / "decks" / "impact-115.inp"
 VARY = ("--vary", "velocity=50:300:40", "--vary", "k=1e6:3e6:25")

@@ -20,7 +20,7 @@ from fecm.problem import NoCurveError, Problem, load_deck, nonlinear_curve
 from fecm.results import MemorySink
 from fecm.simulation import Simulation, run_program
 from fecm.studies import quick_estimate, velocity_at
-from fecm.sweeps import Outcome, backends, in_full, price, tasks
+from fecm.sweeps import in_full, price, tasks
 from fecm.sweeps.plan import plan
 from tests.calls import call
 from tests.test_nonlinear_decks import STRUCK, forces, text
@@ -43,14 +43,11 @@ def problem_of(deck: str) -> Problem:
 def runs(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Peak forces of the full runs that are taken."""
     taken: list[float] = []
-    own = in_full.run_case_in_full
 
-    def counted(*given: Any, **more: Any) -> Outcome:
-        outcome = own(*given, **more)
-        taken.append(float(outcome.columns["peak_force"][0]))
-        return outcome
+    def counted(simulation: Simulation) -> None:
+        taken.append(run_program(simulation).metrics["peak_force"])
 
-    monkeypatch.setattr(backends, "run_case_in_full", counted)
+    monkeypatch.setattr(in_full, "run_program", counted)
     return taken
 
 
@@ -81,12 +78,12 @@ def test_the_limit_of_the_linear_plate_is_none_of_a_nonlinear_one() -> None:
 def test_cases_are_tasks_of_their_own_and_resume() -> None:
     problem = problem_of(DECK)
     cases: list[Case] = [{"velocity": float(v)} for v in range(1, 6)]
-    assert [task.numbers for task in tasks(problem, plan(problem, cases))] == [
+    assert [task.numbers for task in tasks(plan(problem, cases))] == [
         (0,), (1,), (2,), (3,), (4,)
     ]  # fmt: skip
     searches = plan(problem, [{"k": 5e4}, {"k": 6e4}], until=50.0)
-    assert [task.numbers for task in tasks(problem, searches)] == [(0,), (1,)]
-    assert len(tasks(problem_of(LINEAR), plan(problem_of(LINEAR), cases))) == 1
+    assert [task.numbers for task in tasks(searches)] == [(0,), (1,)]
+    assert len(tasks(plan(problem_of(LINEAR), cases))) == 1
 
 
 def test_a_search_takes_few_runs_and_its_velocity_gives_the_same_run_again(

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fecm import _machine
-from fecm.sweeps import Outcome, Settings, Task, execute
+from fecm.sweeps import METHODS, Outcome, Settings, Task, execute
 from tests.decks import model, small
 
 
@@ -49,7 +49,7 @@ def test_a_system_without_a_load_has_all_its_processors(machine: pytest.MonkeyPa
 def sent(monkeypatch: pytest.MonkeyPatch, seconds: float, most: int) -> tuple[int, int, int]:
     """Ten tasks of so many seconds: those run here, those sent to workers, and their workers."""
     settings = Settings(model(small()))
-    tasks = [Task(settings, n, (n,), ({"velocity": 1.0 + n},)) for n in range(10)]
+    tasks = [Task(settings, METHODS[-1], n, (n,), ({"velocity": 1.0 + n},)) for n in range(10)]
     clock, workers = [0.0], [0]
     here: list[int] = []
     others: list[int] = []

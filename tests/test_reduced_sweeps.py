@@ -221,7 +221,7 @@ def test_an_elastic_rod_hits_the_reduced_plate_as_the_full_one() -> None:
 def test_cases_of_many_velocities_are_few_tasks() -> None:
     (problem,) = load_deck(DECK).problems
     cases: list[Any] = [{"velocity": float(v)} for v in range(1, 301)]
-    made = tasks(problem, plan(problem, cases, modes=5))
+    made = tasks(plan(problem, cases, modes=5))
     assert [len(task.numbers) for task in made] == [256, 44]
 
 

@@ -366,7 +366,7 @@ def test_tasks_whose_workers_always_die_end_as_rows(monkeypatch: pytest.MonkeyPa
     def note(task: Task, outcome: Outcome) -> None:
         lost[task.number] = outcome.status[0]
 
-    on_workers(tasks(problem, made), 2, note, lambda: None)
+    on_workers(tasks(made), 2, note, lambda: None)
     assert lost == {0: LOST, 1: LOST}
 
 
@@ -458,7 +458,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         carry_out_plan(problem, made, parts=PartialResults(path, made.fingerprint()), done=stop)
     again = PartialResults(path, made.fingerprint())
-    before = [task.number for task in tasks(problem, made) if again.get(task) is not None]
+    before = [task.number for task in tasks(made) if again.get(task) is not None]
     assert before == begun
     # A part that is not whole is run again.
     (again.folder / "task-000002.npz").write_bytes(b"PK\x03\x04 and no more")

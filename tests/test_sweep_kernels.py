@@ -14,7 +14,7 @@ from fecm._typing import Floats
 from fecm.authoring import Case
 from fecm.mechanics import HystereticLaw, LinearPermanent, kernels
 from fecm.problem import RunOptions, build_model, load_deck
-from fecm.sweeps import backends, plate_response, responses
+from fecm.sweeps import backends, methods, plate_response, responses
 from tests.test_kernels import compiled
 
 DECK = Path("decks/impact-115.inp").read_text().replace("LOOP       4000", "LOOP        600")
@@ -47,7 +47,7 @@ RODS = drawn(velocity=(20.0, 300.0), rod_length=(0.5, 2.0), k=(1e6, 3e6))
 
 def without_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernels, "LIBRARY", None)
-    backends._plate.cache_clear()
+    methods._plate.cache_clear()
 
 
 @compiled

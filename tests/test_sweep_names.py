@@ -16,7 +16,7 @@ from fecm.authoring import VARIABLES, Case, CasesError, Changes, apply_case, par
 from fecm.deck import Deck, Impact, Indentation, Material, Patch
 from fecm.problem.generate import generate
 from fecm.results import ALL_CRITERIA, largest_exposures
-from fecm.sweeps import backends, sweep_summary
+from fecm.sweeps import methods, sweep_summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, model, small
 
@@ -405,7 +405,7 @@ def test_cases_that_differ_in_their_strikes_share_one_deck(monkeypatch: pytest.M
         decks.append(case)
         return apply_case(deck, case)
 
-    monkeypatch.setattr(backends, "apply_case", applied)
+    monkeypatch.setattr(methods, "apply_case", applied)
     vary = {"angle": [30.0], "velocity": [60.0, 115.0], "k": [1e6, 2e6], "mass": [2e-4, 3e-4]}
     found = fecm.sweep(model(small()), vary)
     assert len(found) == 8

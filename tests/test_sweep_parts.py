@@ -50,7 +50,7 @@ def made() -> Plan:
 
 def test_a_part_with_any_byte_changed_or_cut_off_is_damaged(made: Plan, tmp_path: Path) -> None:
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
-    task = tasks(sole_problem(made.settings.deck), made)[0]
+    task = tasks(made)[0]
     parts.put(task, run_task(task))
     (path,) = parts.folder.glob("task-*.npz")
     data = path.read_bytes()
@@ -78,7 +78,7 @@ def test_cases_lost_with_their_workers_are_not_stored_as_finished(
     problem = sole_problem(made.settings.deck)
     found = carry_out_plan(problem, made, parts=parts)
     assert found.completed.tolist() == [False, True]
-    assert [parts.get(task) is None for task in tasks(problem, made)] == [True, False]
+    assert [parts.get(task) is None for task in tasks(made)] == [True, False]
 
 
 def test_a_sweep_that_was_killed_before_its_first_plate_was_done_begins_again(
@@ -97,7 +97,7 @@ def test_a_sweep_that_was_killed_before_its_first_plate_was_done_begins_again(
 
 def test_an_outcome_without_the_mark_of_its_sweep_is_not_taken(made: Plan, tmp_path: Path) -> None:
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
-    (task, *_) = tasks(sole_problem(made.settings.deck), made)
+    (task, *_) = tasks(made)
     parts.put(task, run_task(task))
     (parts.folder / "sweep.json").unlink()
     with pytest.raises(OtherSweepError, match="another sweep"):
@@ -151,7 +151,7 @@ def stored(tmp_path: Path) -> tuple[Path, Path, bytes]:
     made = plan(problem, grid_cases([("layup", ["[0/90]", "[90/0]"])]), history=True)
     assert call(*SWEEP_OF_TWO, "right.h5", cwd=tmp_path).exit_code == 0
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
-    task = tasks(problem, made)[0]
+    task = tasks(made)[0]
     parts.put(task, run_task(task))
     return tmp_path, parts.folder / "task-000000.npz", (tmp_path / "right.h5").read_bytes()
 
@@ -208,7 +208,7 @@ def test_a_part_of_another_sweep_with_the_same_case_numbers_is_run_again(
     problem = sole_problem(folder / "other.inp")
     made = plan(problem, grid_cases([("layup", ["[0/90]", "[90/0]"])]), history=True)
     others = PartialResults(folder / "other.h5", made.fingerprint())
-    task = tasks(problem, made)[0]
+    task = tasks(made)[0]
     others.put(task, run_task(task))
     shutil.copy(others.folder / part.name, part)
     assert "belongs to another sweep" in assert_run_again(stored)

@@ -37,10 +37,11 @@ from fecm.simulation.job import ProblemRun
 from fecm.sweeps.convergence import convergence_lines
 from fecm.sweeps.execute import address_in
 from fecm.sweeps.job import Sweep
-from fecm.sweeps.plan import MEASURES, MOST_MODES
+from fecm.sweeps.reduced import MOST_MODES
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.search import parse_until
 from fecm.sweeps.summary import remarks, sweep_summary, sweep_verdict, tables
+from fecm.sweeps.task import MEASURES
 
 NAMED = [f"{name}=" for name in NAMES]  # for the shell's completion
 

@@ -60,9 +60,9 @@ from fecm.results.validity import MEANING, Reason, reasons_of
 from fecm.simulation.job import Price
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import FILTERS, Filter, filter_of
-from fecm.sweeps.backends import backend_of
+from fecm.sweeps.backends import ImpulseResponse, shares_plate
 from fecm.sweeps.outcome import Backend
-from fecm.sweeps.plan import check_law, shares_plate
+from fecm.sweeps.plan import check_law
 
 FREE = (*CARDS, *OF_RECORD)
 USUAL_EVALUATIONS = 30  # of a fit, each with one force more than there are parameters
@@ -299,7 +299,7 @@ def _shared_backend(deck: Deck) -> Backend:
             "identify needs the whole plate, and the deck has lines of symmetry: a measured force "
             "is that of the whole plate, mass and k are those of the part"
         )
-    return backend_of(problem)
+    return ImpulseResponse(problem)
 
 
 def fit_deck(

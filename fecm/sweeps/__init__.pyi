@@ -1,6 +1,6 @@
 """Names of this room for other rooms and for tests; each is imported when it is first used."""
 
-from fecm.sweeps.backends import run_task as run_task
+from fecm.sweeps.backends import shares_plate as shares_plate
 from fecm.sweeps.checks import ADVANCED_BYTES as ADVANCED_BYTES
 from fecm.sweeps.checks import HISTORY_BYTES as HISTORY_BYTES
 from fecm.sweeps.checks import JUDGED as JUDGED
@@ -15,18 +15,13 @@ from fecm.sweeps.execute import on_workers as on_workers
 from fecm.sweeps.files import save_sweep as save_sweep
 from fecm.sweeps.in_full import without_output as without_output
 from fecm.sweeps.job import Sweep as Sweep
+from fecm.sweeps.methods import METHODS as METHODS
 from fecm.sweeps.outcome import Outcome as Outcome
 from fecm.sweeps.outcome import Status as Status
 from fecm.sweeps.partial_results import DamagedPartError as DamagedPartError
 from fecm.sweeps.partial_results import OtherSweepError as OtherSweepError
 from fecm.sweeps.partial_results import PartialResults as PartialResults
 from fecm.sweeps.partial_results import exclusive_result as exclusive_result
-from fecm.sweeps.plan import MOST_TOGETHER as MOST_TOGETHER
-from fecm.sweeps.plan import Plan as Plan
-from fecm.sweeps.plan import Settings as Settings
-from fecm.sweeps.plan import Task as Task
-from fecm.sweeps.plan import shares_plate as shares_plate
-from fecm.sweeps.plan import tasks as tasks
 from fecm.sweeps.random import DESIGNS as DESIGNS
 from fecm.sweeps.random import Design as Design
 from fecm.sweeps.random import DesignKind as DesignKind
@@ -55,3 +50,10 @@ from fecm.sweeps.statistics import exceedance_bounds as exceedance_bounds
 from fecm.sweeps.statistics import indices as indices
 from fecm.sweeps.statistics import wilson as wilson
 from fecm.sweeps.summary import sweep_summary as sweep_summary
+from fecm.sweeps.task import MOST_TOGETHER as MOST_TOGETHER
+from fecm.sweeps.task import Method as Method
+from fecm.sweeps.task import Plan as Plan
+from fecm.sweeps.task import Settings as Settings
+from fecm.sweeps.task import Task as Task
+from fecm.sweeps.task import run_task as run_task
+from fecm.sweeps.task import tasks as tasks

@@ -1,4 +1,4 @@
-"""Tasks of a sweep, and the back ends that compute the impacts of a task on one plate.
+"""Back ends that compute impacts on one plate.
 
 A linear plate is stepped once under a unit force, and every impact follows by convolution with its
 response. A nonlinear plate is run in full for each impact, or reduced to some bending modes.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -16,13 +16,10 @@ from numpy.typing import NDArray
 
 from fecm._machine import require_memory
 from fecm._typing import Floats
-from fecm.authoring.case import NO_THRESHOLD, PEAK_FORCE, THRESHOLD, Case, CasesError, Value
-from fecm.authoring.impacts import Impacts, impacts_from_cards, impacts_of
-from fecm.authoring.strike import strike_of
-from fecm.authoring.timing import Clock, lengthened, with_clock
-from fecm.authoring.values import apply_case
+from fecm.authoring.impacts import Impacts
+from fecm.authoring.timing import lengthened
 from fecm.deck.macros import flat
-from fecm.deck.model import Deck, Nonlinear
+from fecm.deck.model import Nonlinear
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import HystereticLaw, Law
 from fecm.mechanics.own_law import CaseByCase
@@ -34,24 +31,12 @@ from fecm.simulation.judge import ENERGY_WARNING
 from fecm.sweeps.checks import ADVANCED_BYTES
 from fecm.sweeps.in_full import (
     CasePeaks,
-    in_one_motion,
     judge_cases,
-    problem_of_case,
-    run_case_in_full,
+    run_in_full,
     thresholds_of,
     whole_force,
-    with_hit,
 )
-from fecm.sweeps.outcome import About, Backend, Outcome, Status, merge, outcome_of
-from fecm.sweeps.plan import (
-    FORCES,
-    Measure,
-    MeasureFunction,
-    Plan,
-    Settings,
-    Task,
-    shares_plate,
-)
+from fecm.sweeps.outcome import Outcome, merge, outcome_of
 from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
 from fecm.sweeps.responses import (
     ComputedImpacts,
@@ -61,159 +46,31 @@ from fecm.sweeps.responses import (
     largest_sums,
     plate_response,
 )
-from fecm.sweeps.search import LONGER, UNTIL_OVER, Sought, search
+from fecm.sweeps.search import LONGER, UNTIL_OVER
+from fecm.sweeps.task import Measure
 
-# Tasks --------------------------------------------------------------------------------------------
-
-
-def run_task(task: Task) -> Outcome:
-    """Compute the cases of a task; the status of a failed case is the reason."""
-    settings = task.settings
-    cases = list(zip(task.numbers, task.cases, strict=True))
-    if settings.shares_motion and len(cases) > 1:
-        parts = in_one_motion(settings, task.numbers, task.cases)
-    elif settings.in_full:
-        parts = [_in_full(settings, number, case) for number, case in cases]
-    else:
-        parts = _of_one_plate(task)
-    return merge(parts, history=settings.history)
+# Contact forces that are computed before they are evaluated, where none are stored: 16 MB, which
+# the C library keeps for the next ones and does not give back to the system.
+FORCES = 2_000_000
 
 
-def case_deck(planned: Plan, case: int) -> Deck:
-    """Return the deck of a case with its time step; CasesError if the case can't be computed."""
-    return problem_of_case(planned.settings, planned.cases[case]).deck
+def only_impacts(checked: Problem, names: Collection[str] = ()) -> bool:
+    """Return whether a program has only impact steps of one size, and the plate no other loads.
 
-
-def _of_one_plate(task: Task) -> list[Outcome]:
-    """Compute cases that share a plate."""
-    settings, of_plate = task.settings, task.plate_values
-    try:
-        problem, backend = _plate(
-            settings.deck,
-            tuple(of_plate.items()),
-            settings.clock,
-            settings.measures,
-            modes=settings.modes,
-            history=settings.history,
-        )
-    except CasesError as error:
-        return [Outcome.failed(dict.fromkeys(task.numbers, str(error)))]
-    impacts, reasons = impacts_of(problem, task.numbers, task.cases, settings.law)
-    parts = [Outcome.failed(reasons)]
-    if impacts is not None:
-        outcome = _outcome(settings, problem, backend, impacts)
-        parts.append(with_hit(outcome, problem, of_plate))
-    return parts
-
-
-@lru_cache(maxsize=2)  # full runs and the reduced model alternate
-def _plate(
-    deck: Deck,
-    of_plate: tuple[tuple[str, Value], ...],
-    clock: Clock | None,
-    measures: tuple[Measure, ...],
-    *,
-    modes: int | None,
-    history: bool,
-) -> tuple[Problem, Backend]:
-    """Return the problem of a plate, given by values of names, and its back end."""
-    case: Case = dict(of_plate)
-    problem = with_clock(apply_case(deck, case), clock, case)
-    return problem, backend_of(problem, measures, modes=modes, history=history)
-
-
-def _outcome(settings: Settings, problem: Problem, backend: Backend, impacts: Impacts) -> Outcome:
-    """Compute impacts on a plate, or find their velocities."""
-    if settings.search is None:
-        outcome = backend.lengthened(backend.durations[0]).outcomes(impacts)
-        return _lengthened(outcome, backend, impacts, settings) if backend.lengthens else outcome
-    levels = _levels(settings, problem, impacts)
-    if problem.deck.has(Nonlinear):
-        impacts = _from_quick_models(problem, impacts, levels)
-    return search(backend, impacts, settings.search.quantity, levels)
-
-
-def _levels(settings: Settings, problem: Problem, impacts: Impacts) -> Floats:
-    """Return the peak forces that a search must reach, (rows,)."""
-    assert settings.search is not None
-    level = settings.search.level
-    if level != THRESHOLD:
-        return np.full(len(impacts), float(level))
-    if (thresholds := thresholds_of(problem, impacts.toughness)) is None:
-        raise CasesError(NO_THRESHOLD)
-    return thresholds
-
-
-def _lengthened(
-    outcome: Outcome, backend: Backend, impacts: Impacts, settings: Settings
-) -> Outcome:
-    """Repeat impacts that end between contacts, or may touch again, with a longer response."""
-    no_contact = outcome.columns[About.STATUS] == Status.OK
-    candidates = np.array(outcome.numbers)[no_contact]
-    for factor in backend.durations[1:]:
-        is_open = np.isin(outcome.numbers, candidates) & np.isnan(outcome.columns[PEAK_FORCE])
-        if not is_open.any():
-            break
-        again = np.flatnonzero(np.isin(impacts.numbers, np.array(outcome.numbers)[is_open]))
-        longer = backend.lengthened(factor).outcomes(impacts.select(again))
-        parts = [outcome.select(np.flatnonzero(~is_open)), longer]
-        outcome = merge(parts, history=settings.history)
-    return outcome
-
-
-def _from_quick_models(problem: Problem, impacts: Impacts, levels: Floats) -> Impacts:
-    """Return impacts on a nonlinear plate at the velocities that the quick models estimate."""
-    from fecm.studies.estimate import velocity_at  # 0.1 s, which most sweeps don't need
-
-    rows = np.arange(len(impacts))
-    starts = [
-        velocity_at(replace(problem, deck=impacts.deck(row)), float(levels[row]))
-        for row in rows.tolist()
-    ]
-    return replace(impacts.at_velocities(rows, np.array(starts)), numbers=impacts.numbers)
-
-
-def _in_full(settings: Settings, number: int, case: Case) -> Outcome:
-    """Compute a case on its own plate by full runs."""
-    sought = settings.search
-    try:
-        problem = problem_of_case(settings, case)
-        if sought is None or sought.quantity is not Sought.EXPOSURE:
-            outcome = run_case_in_full(
-                number, problem, settings.measures, settings.measure, case, law=settings.law
-            )
-        else:
-            level, at_rest = float(sought.level), problem.worst_at_rest
-            if at_rest is not None and at_rest.exposure >= level:
-                raise CasesError(f"the plate at rest has the exposure {at_rest.exposure:.4g}")
-            strikes = {number: strike_of(problem.deck)}
-            impacts = impacts_from_cards(strikes, settings.law, problem.symmetry.factor)
-            backend = FullRuns(problem, settings.measures)
-            outcome = search(backend, impacts, sought.quantity, np.array([level]))
-    except CasesError as error:
-        return Outcome.failed({number: str(error)})
-    return outcome if settings.build else with_hit(outcome, problem, case)
-
-
-# Back ends ----------------------------------------------------------------------------------------
-
-
-def backend_of(
-    problem: Problem,
-    measures: Sequence[Measure] = (),
-    *,
-    modes: int | None = None,
-    history: bool = True,
-) -> Backend:
-    """Return the back end for the plate of a problem, in bending modes if `modes` is given.
-
-    Forces are kept with `history`.
+    `names` are the names of the values of cases; the time step ``dt`` replaces all sizes.
     """
-    if modes is not None:
-        return BendingModes(problem, measures, modes, history)
-    if shares_plate(problem):
-        return ImpulseResponse(problem, measures, history)
-    return FullRuns(problem, measures)
+    words = [macro.word for macro in flat(checked.program)]
+    sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
+    if "RODP" not in words or not sizes or words.index("DT") > words.index("RODP"):
+        return False
+    if len(sizes) > 1 and "dt" not in names:
+        return False
+    return {"EXCD", "TANG", "FORM", "SOLV"}.isdisjoint(words) and not checked.mesh.forces.any()
+
+
+def shares_plate(checked: Problem, names: Collection[str] = ()) -> bool:
+    """Return whether cases of a linear plate share a response: see :func:`only_impacts`."""
+    return not checked.deck.has(Nonlinear) and only_impacts(checked, names)
 
 
 @dataclass
@@ -310,8 +167,6 @@ class FullRuns:
 
     problem: Problem
     measures: Sequence[Measure] = ()
-    measure: MeasureFunction | None = None  # computes more columns from the result of a run
-    names: Collection[str] = ()  # of the values of the case, which these columns may not have
     computes_together = False
     lengthens = False
     durations = LONGER  # a run with OVER ends when it is decided
@@ -322,14 +177,10 @@ class FullRuns:
 
     def _outcome(self, impacts: Impacts, row: int) -> Outcome:
         problem = replace(self.problem, deck=impacts.deck(row))
-        return run_case_in_full(
-            impacts.numbers[row],
-            problem,
-            self.measures,
-            self.measure,
-            self.names,
-            law=impacts.own_law,
+        (outcome,) = run_in_full(
+            {impacts.numbers[row]: problem}, self.measures, law=impacts.own_law
         )
+        return outcome
 
     def lengthened(self, factor: float) -> FullRuns:
         """Return the back end of a run `factor` times as long."""

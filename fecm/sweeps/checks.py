@@ -24,11 +24,9 @@ from fecm.deck.findings import Finding, Findings
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.mesh import element_centres
 from fecm.problem.check import check_segments, check_values
-from fecm.problem.memory import needed_bytes, reduction_bytes
 from fecm.problem.problem import Problem
 from fecm.problem.symmetry import SAME_LINE
-from fecm.sweeps.in_full import stores_rows, without_output
-from fecm.sweeps.plan import FORCES, MOST_TOGETHER, Plan, runs_together, tasks
+from fecm.sweeps.task import MOST_TOGETHER, Plan, tasks
 
 THICKNESS = "thickness"
 LAMINATE = names_of(Changes.LAMINATE)
@@ -71,7 +69,7 @@ def doubtful_values(checked: Problem, cases: Sequence[Case]) -> list[str]:
 
 def unused_values(planned: Plan) -> list[str]:
     """Say which values change nothing, because the sweep leaves out the exposures."""
-    if planned.settings.in_full:
+    if planned.settings.has_exposures:
         return []
     if not (names := [name for name in EXPOSURE_NAMES if name in planned.cases[0]]):
         return []
@@ -172,12 +170,12 @@ def _findings(problem: Problem) -> list[Finding]:
     return [finding for finding in findings if finding.severity == "warning"]
 
 
-def freed(checked: Problem, definition: Plan) -> int:
+def freed(definition: Plan) -> int:
     """Count cases with B != 0 in which u and v, restrained at every node, are released."""
     count = 0
     if definition.cases[0].keys().isdisjoint(LAMINATE):
         return count
-    for task in tasks(checked, definition):
+    for task in tasks(definition):
         if "support" in task.cases[0]:  # which has its own u and v
             continue
         deck = task.settings.deck
@@ -221,38 +219,23 @@ def sweep_memory(
     `workers` is the number of workers on this machine, 0 if a cluster runs the cases. If histories
     are `streamed` to files, only the histories of one task are held.
     """
-    settings = definition.settings
+    settings, method = definition.settings, definition.method
     if REFINE in definition.cases[-1]:
         checked = check_deck(apply_case(settings.deck, definition.cases[-1]))
     elif not LONGER.isdisjoint(definition.cases[-1]):
         with suppress(CasesError):  # of a case that fails
             checked = check_deck(apply_case(settings.deck, max(definition.cases, key=_steps)))
     steps, cases = checked.work.steps, len(definition.cases)
-    at_once = min(workers, len(tasks(checked, definition))) if workers > 1 else workers
-    plate = checked if settings.measure else without_output(checked, settings.measures)
-    in_memory = settings.measure is not None or (
-        settings.modes is None and stores_rows(checked, settings.measures)
-    )
+    at_once = min(workers, len(tasks(definition))) if workers > 1 else workers
     stored = 0
     if settings.history:
         stored = HISTORY_BYTES * steps * (min(cases, MOST_TOGETHER) if streamed else cases)
 
     def of_process(exact: bool) -> int:
-        run = needed_bytes(plate, in_memory=in_memory, exact=exact)
-        if settings.modes is not None:  # beside the full runs of some cases
-            run = max(run, reduction_bytes(checked.plate, settings.modes))
-        return run + ADVANCED_BYTES * steps * _held_together(checked, definition, steps)
+        run = method.process_bytes(checked, settings, exact=exact)
+        return run + ADVANCED_BYTES * steps * method.most_forces(definition, steps)
 
     return SweepMemory(stored, at_once, of_process)
-
-
-def _held_together(checked: Problem, definition: Plan, steps: int) -> int:
-    """Return the largest number of runs whose forces are held at once."""
-    together, settings = runs_together(checked, definition), definition.settings
-    by_kernels = LIBRARY is not None and settings.law is None and settings.modes is None
-    if settings.history or not by_kernels:
-        return together
-    return min(together, max(1, FORCES // steps))
 
 
 def check_sweep_memory(

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from fecm._options import declared_options
 from fecm.authoring.case import CasesError
-from fecm.sweeps.plan import Measure
 from fecm.sweeps.search import Sought, search_of
+from fecm.sweeps.task import Measure
 
 if TYPE_CHECKING:
     from fecm.sweeps.job import Sweep

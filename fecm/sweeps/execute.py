@@ -17,7 +17,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent import futures
 from contextlib import nullcontext, suppress
-from dataclasses import replace
 from functools import partial
 from multiprocessing import resource_tracker
 from multiprocessing.synchronize import Event
@@ -30,14 +29,12 @@ from fecm._inputs import read_input
 from fecm._machine import NotEnoughMemoryError, free_processors
 from fecm._watch import SILENT, StoppedError, Watch
 from fecm.problem.problem import Problem
-from fecm.sweeps.backends import run_task
 from fecm.sweeps.checks import check_sweep_memory
 from fecm.sweeps.in_full import format_exception
 from fecm.sweeps.outcome import Outcome, merge
 from fecm.sweeps.partial_results import DamagedPartError, PartialResults
-from fecm.sweeps.plan import WORTH_WORKERS, Plan, Task, tasks
-from fecm.sweeps.reduced import ReducedModel, Trials, by_energy, count_held, trials
 from fecm.sweeps.result import SweepResult, sweep_result
+from fecm.sweeps.task import WORTH_WORKERS, Plan, Task, run_task
 
 Done = Callable[[Task, Outcome], None]
 Idle = Callable[[], None]  # called regularly while workers run, to handle signals
@@ -361,10 +358,11 @@ def carry_out_plan(
 
     most_workers = partial(_most_workers, problem, definition, streamed=not keeps_forces)
     run = partial(_outcomes, means, parts, most_workers, idle, watch)
-    if definition.settings.modes is None:
-        model, whole = None, tasks(problem, definition)
-    else:
-        model, whole = _by_model(problem, definition, definition.settings.modes, run, watch)
+
+    def run_tried(tried: Sequence[Task]) -> list[tuple[Task, Outcome]]:
+        return run(tried, lambda task, outcome: None)
+
+    whole, model = definition.method.prepared(definition, run_tried, watch)
     if parts is not None:
         parts.tasks = whole
     try:
@@ -375,34 +373,6 @@ def carry_out_plan(
         raise SchedulerError(f"{error}; the sweep ended {progress()}") from None
     history = definition.settings.history and keeps_forces
     return sweep_result(definition, merge(outcomes, history=history), model)
-
-
-def _by_model(
-    problem: Problem,
-    definition: Plan,
-    modes: int,
-    run: Callable[[Sequence[Task], Done], list[tuple[Task, Outcome]]],
-    watch: Watch,
-) -> tuple[ReducedModel, list[Task]]:
-    """Compare the reduced model with full runs, and return the tasks by the model or in full.
-
-    Raises CasesError if the model holds for no case.
-    """
-    ordered, count = by_energy(definition), len(definition.cases)
-    tried = Trials(definition, count, lambda whole: run(whole, lambda task, outcome: None))
-    held = count_held(ordered, tried.failing)
-    model = replace(tried.compared(modes), in_full=len(ordered) - held)
-    if not held:
-        model.check()
-    in_full = set(ordered[held:])
-    if not in_full:
-        return model, tasks(problem, definition)
-    watch.note(model.note)
-    rest = [case for case in range(count) if case not in in_full]
-    fulls = [
-        task for task in trials(definition, sorted(in_full), count) if task.settings.modes is None
-    ]
-    return model, [*tasks(problem, definition, rest), *fulls]
 
 
 def _outcomes(

@@ -45,10 +45,10 @@ from fecm.results.run_metrics import deflection_of
 from fecm.results.sinks import MemorySink, Sink
 from fecm.results.validity import Extent, reasons_of
 from fecm.simulation.recorder import exposures_of
-from fecm.simulation.run import run_program, simulate
+from fecm.simulation.run import run_program
 from fecm.simulation.simulation import Criteria, Observer, Simulation
 from fecm.sweeps.outcome import About, Outcome, outcome_of
-from fecm.sweeps.plan import BuildFunction, Measure, MeasureFunction, Settings
+from fecm.sweeps.task import BuildFunction, Measure, MeasureFunction, Plan, Settings
 
 
 class CasePeaks(NamedTuple):
@@ -148,6 +148,11 @@ def problem_of_case(settings: Settings, case: Case) -> Problem:
     return checked
 
 
+def case_deck(planned: Plan, case: int) -> Deck:
+    """Return the deck of a case with its time step; CasesError if the case can't be computed."""
+    return problem_of_case(planned.settings, planned.cases[case]).deck
+
+
 def built(build: BuildFunction, case: Case) -> LoadedDeck:
     """Build and check the deck of a case.
 
@@ -175,83 +180,63 @@ def with_hit(outcome: Outcome, checked: Problem, case: Case) -> Outcome:
     return outcome
 
 
-def run_case_in_full(
-    number: int,
-    checked: Problem,
+def run_in_full(
+    problems: Mapping[int, Problem],
     measures: Sequence[Measure],
     measure: MeasureFunction | None = None,
     names: Collection[str] = (),
     *,
     law: Law | None = None,
-) -> Outcome:
-    """Run one case in full, without storing fields unless a function measures them.
-
-    `names` has the names of its values, which the columns of `measure` may not have.
-    """
-    sink, program = MemorySink(), checked if measure else without_output(checked, measures)
-    try:
-        simulation = simulate(program, sink, RunOptions(law=law))
-    except (DivergenceError, LawError, ArithmeticError) as error:
-        return Outcome.failed({number: str(error)})
-    result = Result(sink.arrays, sink.texts, sink.groups)
-    outcome = _outcome(number, checked, measures, result, simulation.state.dt)
-    if measure is not None:
-        outcome.columns |= _measured(measure, result, names)
-    return outcome
-
-
-def in_one_motion(
-    settings: Settings, numbers: Sequence[int], cases: Sequence[Case]
 ) -> list[Outcome]:
-    """Run cases that differ only in residual stresses, strengths or toughness.
+    """Run problems of cases that differ only in residual stresses, strengths or toughness.
 
-    One run has the motion of all cases, and its FAIL evaluates the exposures of each.
+    One run has the motion of all cases, and its FAIL evaluates the exposures of each. It stores no
+    fields unless a function measures them. `problems` has the number of each case, `names` the
+    names of its values, which the columns of `measure` may not have.
     """
-    measures, sink = settings.measures, MemorySink()
-    built_cases: dict[int, tuple[Problem, Case]] = {}
-    reasons: dict[int, str] = {}
-    for number, case in zip(numbers, cases, strict=True):
-        try:
-            built_cases[number] = problem_of_case(settings, case), case
-        except CasesError as error:
-            reasons[number] = str(error)
-    invalid = [Outcome.failed(reasons)] if reasons else []
-    if not built_cases:
-        return invalid
-    problems = [problem for problem, _ in built_cases.values()]
+    sink = MemorySink()
     try:
-        simulation = motion(settings, problems, sink)
+        simulation = motion([*problems.values()], sink, measures, measure, law)
         run_program(simulation)
-    except (CasesError, DivergenceError, LawError, ArithmeticError) as error:
-        return [*invalid, Outcome.failed(dict.fromkeys(built_cases, str(error)))]
+    except (DivergenceError, LawError, ArithmeticError) as error:
+        return [Outcome.failed(dict.fromkeys(problems, str(error)))]
     arrays_of_case: list[dict[str, Floats]] = [{} for _ in problems]
     places = simulation.model.stress_places
     for number, other in enumerate(simulation.others, start=1):
         assert places is not None  # the program has FAIL
         arrays_of_case[number] = exposures_of(other.monitor, other.envelope, places)
-    outcomes = invalid
-    for (number, (built_problem, case)), arrays in zip(
-        built_cases.items(), arrays_of_case, strict=True
-    ):
+    outcomes = []
+    for (number, problem), arrays in zip(problems.items(), arrays_of_case, strict=True):
         shaped = {path: values.reshape(sink.arrays[path].shape) for path, values in arrays.items()}
         result = Result({**sink.arrays, **shaped}, sink.texts, sink.groups)
-        outcome = _outcome(number, built_problem, measures, result, simulation.state.dt)
-        outcomes.append(with_hit(outcome, built_problem, case))
+        outcome = _outcome(number, problem, measures, result, simulation.state.dt)
+        if measure is not None:
+            outcome.columns |= _measured(measure, result, names)
+        outcomes.append(outcome)
     return outcomes
 
 
 def motion(
-    settings: Settings, problems: Sequence[Problem], sink: Sink, observers: Sequence[Observer] = ()
+    problems: Sequence[Problem],
+    sink: Sink,
+    measures: Sequence[Measure],
+    measure: MeasureFunction | None = None,
+    law: Law | None = None,
+    observers: Sequence[Observer] = (),
 ) -> Simulation:
-    """Return the simulation of problems that differ only in values of failure.
-
-    It stores no fields unless a function measures them.
-    """
-    first = problems[0] if settings.measure else without_output(problems[0], settings.measures)
-    simulation = Simulation(first, sink, RunOptions(law=settings.law), observers=observers)
-    if Measure.FAILURE in settings.measures:
+    """Return the simulation of problems that differ only in values of failure."""
+    program = as_run(problems[0], measures, measure)
+    simulation = Simulation(program, sink, RunOptions(law=law), observers=observers)
+    if Measure.FAILURE in measures:
         simulation.others = [_criteria(simulation, problem) for problem in problems[1:]]
     return simulation
+
+
+def as_run(
+    checked: Problem, measures: Sequence[Measure], measure: MeasureFunction | None = None
+) -> Problem:
+    """Return the problem of a full run, which stores fields only for a function that measures."""
+    return checked if measure is not None else without_output(checked, measures)
 
 
 def _criteria(simulation: Simulation, checked: Problem) -> Criteria:

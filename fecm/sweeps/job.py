@@ -35,7 +35,6 @@ from fecm.problem.build import RunOptions
 from fecm.problem.loading import AnyDeck, LoadedDeck, load_deck, sole
 from fecm.problem.problem import Problem
 from fecm.simulation.job import Price, ProblemRun
-from fecm.sweeps.backends import case_deck
 from fecm.sweeps.checks import (
     check_sweep_memory,
     doubtful_values,
@@ -48,23 +47,11 @@ from fecm.sweeps.distributions import FORMS, OwnDistribution, distribution_of
 from fecm.sweeps.exclusions import check_options
 from fecm.sweeps.execute import LOST, Done, Means, SchedulerError, carry_out_plan
 from fecm.sweeps.files import save_sweep
-from fecm.sweeps.in_full import built
+from fecm.sweeps.in_full import built, case_deck
 from fecm.sweeps.outcome import Outcome, Status
 from fecm.sweeps.partial_results import PartialResults, exclusive_result
-from fecm.sweeps.plan import (
-    MEASURES,
-    MODES,
-    REDUCED,
-    BuildFunction,
-    Measure,
-    MeasureFunction,
-    Plan,
-    Task,
-    plan,
-    shares_plate,
-    tasks,
-)
-from fecm.sweeps.price import expected, output_bytes, seconds_of
+from fecm.sweeps.plan import plan
+from fecm.sweeps.price import output_bytes
 from fecm.sweeps.random import (
     DESIGNS,
     REMEDY,
@@ -72,14 +59,23 @@ from fecm.sweeps.random import (
     DesignKind,
     Pair,
     correlation_of,
-    cost,
     design_of,
     doubt,
     parse_correlation,
     random_cases,
 )
+from fecm.sweeps.reduced import MODES, REDUCED
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.search import with_level
+from fecm.sweeps.task import (
+    MEASURES,
+    BuildFunction,
+    Measure,
+    MeasureFunction,
+    Plan,
+    Task,
+    tasks,
+)
 
 Named = str | Sequence[str]  # one text of the form NAME=..., or several
 
@@ -389,7 +385,7 @@ class Sweep:
             texts += [*unused_values(self.plan), *doubtful_values(self.problem, cases)]
         if design is not None and (text := doubt(design)):
             texts.append(text)
-        if self.build is None and (count := freed(self.problem, self.plan)):
+        if self.build is None and (count := freed(self.plan)):
             texts.append(
                 f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the "
                 "deck restrains at every node, are free there except where w is held"
@@ -407,25 +403,8 @@ class Sweep:
 
         On a nonlinear plate, say how long they take, too.
         """
-        definition, texts = self.plan, []
-        if definition.design is not None:
-            shared = shares_plate(self.problem) and not definition.settings.in_full
-            texts.append(
-                cost(
-                    definition.cases,
-                    definition.design,
-                    shared=shared or definition.settings.modes is not None,
-                    motions=definition.settings.shares_motion,
-                )
-            )
-        if (
-            definition.settings.modes is None
-            and self.build is None
-            and self.problem.plate.nonlinear
-        ):
-            workers = 0 if self.scheduler is not None else self.workers
-            texts.append(expected(self.problem, definition, workers))
-        return texts
+        workers = 0 if self.scheduler is not None else self.workers
+        return self.plan.method.expectation(self.problem, self.plan, workers)
 
     @cached_property
     def price(self) -> Price:
@@ -434,9 +413,9 @@ class Sweep:
         Steps are steps of the plate: cases that share a plate take its steps once.
         """
         problem, definition = self.problem, self.plan
-        steps, seconds = seconds_of(problem, definition)
+        steps, seconds = definition.method.work(problem, definition)
         if not self._means.is_chosen:
-            seconds /= max(1, min(self.workers or 1, len(tasks(problem, definition))))
+            seconds /= max(1, min(self.workers or 1, len(tasks(definition))))
         memory = sweep_memory(problem, definition, self._means.here, streamed=self._streams)
         return Price(steps, output_bytes(problem, definition), memory.needed(), seconds)
 

@@ -28,7 +28,7 @@ from fecm.results.stored import Stored
 from fecm.simulation.run import run_program
 from fecm.simulation.simulation import Simulation
 from fecm.sweeps.in_full import without_output
-from fecm.sweeps.plan import Measure
+from fecm.sweeps.task import Measure
 
 
 @dataclass(frozen=True)

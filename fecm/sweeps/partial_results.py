@@ -23,7 +23,7 @@ from fecm._files import OutputError, beside, held, make_folder, open_ordinary, p
 from fecm._typing import Array
 from fecm.results.metrics import COLUMNS, GAGE, SUMMARY
 from fecm.sweeps.outcome import About, Forces, Outcome
-from fecm.sweeps.plan import Task
+from fecm.sweeps.task import Task
 
 CHECKSUM = hashlib.sha256().digest_size  # bytes of the checksum after the arrays of a file
 MOST_MARK = 1000  # bytes of the file with the fingerprint of the folder's sweep

@@ -16,10 +16,9 @@ from fecm.problem.problem import Problem
 from fecm.results.metrics import SUMMARY
 from fecm.results.sinks import MemorySink
 from fecm.simulation.job import seconds_of_steps
-from fecm.sweeps.backends import run_task
 from fecm.sweeps.in_full import motion, problem_of_case
-from fecm.sweeps.plan import WORTH_WORKERS, Plan, Settings, Task, shares_plate, tasks
 from fecm.sweeps.search import USUAL
+from fecm.sweeps.task import WORTH_WORKERS, Plan, Settings, Task, run_task, tasks
 
 FILE = 35_000  # bytes of a file with few cases: groups, attributes, the deck
 FEW_CASES = 64  # cases that show what a case costs once its plate is stepped
@@ -37,12 +36,12 @@ def expected(problem: Problem, definition: Plan, workers: int | None) -> str:
     runs = "one full run each"
     if definition.settings.search is not None:
         runs = f"about {USUAL} full runs each"
-    motions = _motions(problem, definition)
-    if len(motions) < count:
-        runs = f"{len(motions)} full run{'' if len(motions) == 1 else 's'}"
-        count = len(motions)
+    motions = len(tasks(definition))
+    if motions < count:
+        runs = f"{motions} full run{'' if motions == 1 else 's'}"
+        count = motions
     text = f"a nonlinear plate has no impulse response: {cases}, {runs}"
-    _, seconds = _of_full_runs(problem, definition, motions)
+    _, seconds = work_of_runs(problem, definition)
     if math.isnan(seconds):
         return text
     if workers is None:
@@ -53,18 +52,13 @@ def expected(problem: Problem, definition: Plan, workers: int | None) -> str:
     return f"{text}: about {_rounded(seconds / max(1, min(workers, count)))}{where}"
 
 
-def seconds_of(problem: Problem, definition: Plan) -> tuple[int, float]:
-    """Return the steps of the plate that a sweep takes, and their seconds in one process.
+def work_of_plates(problem: Problem, definition: Plan) -> tuple[int, float]:
+    """Return the steps of the plates of a sweep, and its seconds in one process.
 
-    The first case of a shared plate is computed, and then some more: their response stays in memory
-    for the sweep. The seconds are NaN if they are not known.
+    The first case of a plate is computed, and then some more: their response stays in memory for
+    the sweep.
     """
-    settings = definition.settings
-    if settings.build is not None:
-        return problem.work.steps * len(definition.cases), math.nan
-    if settings.modes is None and (settings.in_full or not shares_plate(problem)):
-        return _of_full_runs(problem, definition, _motions(problem, definition))
-    whole = tasks(problem, definition)
+    whole = tasks(definition)
     first = whole[0]
     alone, several = (
         replace(first, numbers=first.numbers[:count], cases=first.cases[:count])
@@ -88,18 +82,10 @@ def output_bytes(problem: Problem, definition: Plan) -> int:
     return FILE + 8 * len(definition.cases) * (columns + steps)
 
 
-def _motions(problem: Problem, definition: Plan) -> list[Sequence[Case]]:
-    """Return the cases of each full run: those that share a motion, or one."""
-    if not definition.settings.shares_motion:
-        return [(case,) for case in definition.cases]
-    return [task.cases for task in tasks(problem, definition)]
-
-
-def _of_full_runs(
-    problem: Problem, definition: Plan, motions: Sequence[Sequence[Case]]
-) -> tuple[int, float]:
+def work_of_runs(problem: Problem, definition: Plan) -> tuple[int, float]:
     """Return steps and seconds of full runs; the seconds are NaN if a run of a few steps fails."""
     each = 1 if definition.settings.search is None else USUAL
+    motions = [task.cases for task in tasks(definition)]
     duration = duration_of(problem)
     steps = sum(_full_steps(cases[0], duration, problem.work.steps) for cases in motions)
     before, step = _costs(problem, definition.settings, motions[0])
@@ -114,7 +100,14 @@ def _costs(problem: Problem, settings: Settings, cases: Sequence[Case]) -> tuple
     checking = time.perf_counter() - begin
     problems = [problem] * len(cases)
     before, step = seconds_of_steps(
-        lambda observer: motion(settings, problems, MemorySink(), [observer])
+        lambda observer: motion(
+            problems,
+            MemorySink(),
+            settings.measures,
+            settings.measure,
+            settings.law,
+            [observer],
+        )
     )
     return checking * len(cases) + before, step
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.authoring.case import Case, CasesError, check_count, number_of_text
-from fecm.authoring.values import FAILURE_NAMES, OF_PLATE, PLATE_NAMES
+from fecm.authoring.values import OF_PLATE, PLATE_NAMES
 from fecm.sweeps.distributions import (
     CustomDistribution,
     ValueDistribution,
@@ -243,20 +243,9 @@ def random_cases(design: Design, varied: Sequence[Case]) -> list[Case]:
     return [{**case, **row} for case in varied for row in rows]
 
 
-def cost(cases: Sequence[Case], design: Design, *, shared: bool, motions: bool) -> str:
-    """Say how many plates a random sweep needs, and which names cause them.
-
-    Cases may share the response of a plate, or a motion if only failure differs.
-    """
-    what = f"{design.draws} draws"
-    if len(cases) != design.draws:
-        what = f"{len(cases)} cases of {what}"
-    if not shared:
-        names = [name for name in cases[0] if motions and name in FAILURE_NAMES]
-        how = (
-            f"; those that differ only in {', '.join(names)}, together" if names else ", one by one"
-        )
-        return f"{what} are run in full{how}"
+def cost_of_plates(cases: Sequence[Case], design: Design) -> str:
+    """Say how many plates a random sweep needs, and which names cause them."""
+    what = _draws(cases, design)
     of_plate = [name for name in cases[0] if name in OF_PLATE]
     plates = len({tuple(case[name] for name in of_plate) for case in cases})
     causes = [name for name in design.laws if name in PLATE_NAMES]
@@ -265,3 +254,19 @@ def cost(cases: Sequence[Case], design: Design, *, shared: bool, motions: bool) 
     why = f"because {' and '.join(causes)} {'is' if len(causes) == 1 else 'are'} random"
     sharing = "velocity, k, alpha_p, s_p, q and the projectile share one"
     return f"{what} need {plates} plates, {why}; {sharing}"
+
+
+def cost_of_runs(cases: Sequence[Case], design: Design, shared: Collection[str]) -> str:
+    """Say how a random sweep is run in full.
+
+    Cases that differ only in values of the `shared` names have one run.
+    """
+    names = [name for name in cases[0] if name in shared]
+    how = f"; those that differ only in {', '.join(names)}, together" if names else ", one by one"
+    return f"{_draws(cases, design)} are run in full{how}"
+
+
+def _draws(cases: Sequence[Case], design: Design) -> str:
+    """Say how many draws a random sweep has, and how many cases."""
+    draws = f"{design.draws} draws"
+    return draws if len(cases) == design.draws else f"{len(cases)} cases of {draws}"

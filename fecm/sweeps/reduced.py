@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from fecm._errors import ResultFileError
 from fecm._table import Row
 from fecm._typing import Floats, Indices
+from fecm._watch import Watch
 from fecm.authoring.case import CasesError
 from fecm.authoring.impacts import Impacts
 from fecm.authoring.strike import Strike
@@ -34,7 +36,6 @@ from fecm.problem.problem import Problem
 from fecm.results.metrics import RATIO, IndentationMetrics
 from fecm.results.schema import SWEEP_DATASETS
 from fecm.sweeps.outcome import About, Column, Outcome, merge
-from fecm.sweeps.plan import MOST_MODES, Plan, Task
 from fecm.sweeps.responses import (
     BLOCK,
     ComputedImpacts,
@@ -46,6 +47,7 @@ from fecm.sweeps.responses import (
     Work,
     balance_errors,
 )
+from fecm.sweeps.task import Method, Plan, Prepared, RunTasks, Task, tasks
 
 if TYPE_CHECKING:
     from fecm.results.hdf5_reader import FileContents
@@ -57,6 +59,9 @@ PLATE_PHASE = 0.5
 PROJECTILE_PHASE = 0.2
 # A contact that is still stiffer is left to the balance of energy.
 MOST_HALVINGS = 10
+REDUCED = "reduced"  # name of the model
+MODES = 21  # bending modes of the model, if the caller gives no number
+MOST_MODES = 40
 
 
 @dataclass(frozen=True)
@@ -166,7 +171,6 @@ def largest_time_step(plate: ReducedPlate, strike: Strike) -> float:
     )
 
 
-RunTasks = Callable[[Sequence[Task]], list[tuple[Task, Outcome]]]
 GROUP = "reduced"
 LIMIT = 0.02  # largest difference of the peaks, relative to the full run
 TRIAL_COLUMNS = tuple(d.name for d in SWEEP_DATASETS.values() if d.group == GROUP)
@@ -242,16 +246,6 @@ class ReducedModel:
         )
 
 
-def trials(definition: Plan, cases: Sequence[int], first: int) -> list[Task]:
-    """Return tasks of cases, in full and by the model; case n has number `first` + 2 n."""
-    both = (replace(definition.settings, modes=None), definition.settings)
-    return [
-        Task(pair, first + 2 * case + place, (case,), (definition.cases[case],))
-        for case in cases
-        for place, pair in enumerate(both)
-    ]
-
-
 def by_energy(definition: Plan) -> list[int]:
     """Return the cases with an energy, the smallest first.
 
@@ -268,30 +262,78 @@ def by_energy(definition: Plan) -> list[int]:
 
 
 class Trials:
-    """Cases that were run in full and by the model."""
+    """Cases that were run in full, by the method `in_full`, and by the model.
 
-    def __init__(self, definition: Plan, first: int, run: RunTasks) -> None:
-        self._made, self._first, self._run = definition, first, run
-        self._fulls: list[Outcome] = []
-        self._models: list[Outcome] = []
+    The tasks of case n have the numbers `count` + 2 n and, by the model, `count` + 2 n + 1: they
+    follow the numbers of the tasks of all `count` cases.
+    """
+
+    def __init__(self, definition: Plan, in_full: Method, run: RunTasks) -> None:
+        self._definition, self._in_full, self._run = definition, in_full, run
+        self._fulls: dict[int, Outcome] = {}
+        self._models: dict[int, Outcome] = {}
+
+    def full_run(self, case: int) -> Task:
+        """Return the task of the full run of a case."""
+        return self._task(self._in_full, case, 0)
+
+    def _task(self, method: Method, case: int, place: int) -> Task:
+        cases = self._definition.cases
+        number = len(cases) + 2 * case + place
+        return Task(self._definition.settings, method, number, (case,), (cases[case],))
 
     def failing(self, cases: Iterable[int]) -> set[int]:
         """Run cases that have not been run, and return those for which the model fails."""
-        before = {number for outcome in self._fulls for number in outcome.numbers}
-        new = [case for case in dict.fromkeys(cases) if case not in before]
-        for task, outcome in self._run(trials(self._made, new, self._first)) if new else ():
-            (self._models if task.settings.modes else self._fulls).append(outcome)
-        full, model = (merge(outcomes, history=False) for outcomes in (self._fulls, self._models))
+        pairs = [
+            (self.full_run(case), self._task(self._definition.method, case, 1))
+            for case in dict.fromkeys(cases)
+            if case not in self._fulls
+        ]
+        if pairs:
+            outcomes = {task.number: outcome for task, outcome in self._run([*chain(*pairs)])}
+            for full_task, model_task in pairs:
+                (case,) = full_task.numbers
+                self._fulls[case] = outcomes[full_task.number]
+                self._models[case] = outcomes[model_task.number]
+        full, model = self._merged()
         forces = [part.columns[About.REACHED] for part in (model, full)]
         holds = ~full.fine | (model.fine & (np.abs(forces[0] - forces[1]) <= LIMIT * forces[1]))
         return {number for number, part in zip(full.numbers, holds, strict=True) if not part}
+
+    def _merged(self) -> tuple[Outcome, Outcome]:
+        """Return the outcomes of the full runs, and of the model."""
+        parts = [*self._fulls.values()], [*self._models.values()]
+        full, model = (merge(outcomes, history=False) for outcomes in parts)
+        return full, model
 
     def compared(self, modes: int) -> ReducedModel:
         """Compare the model with the full runs.
 
         Raises CasesError if all failed.
         """
-        return compared(modes, self._fulls, self._models)
+        return compared(modes, *self._merged())
+
+
+def tasks_beside_full_runs(
+    definition: Plan, in_full: Method, modes: int, run: RunTasks, watch: Watch
+) -> Prepared:
+    """Compare the reduced model with full runs, and return the tasks by the model or in full.
+
+    Raises CasesError if the model holds for no case.
+    """
+    ordered = by_energy(definition)
+    tried = Trials(definition, in_full, run)
+    held = count_held(ordered, tried.failing)
+    model = replace(tried.compared(modes), in_full=len(ordered) - held)
+    if not held:
+        model.check()
+    beyond = set(ordered[held:])
+    if not beyond:
+        return Prepared(tasks(definition), model)
+    watch.note(model.note)
+    rest = [case for case in range(len(definition.cases)) if case not in beyond]
+    fulls = [tried.full_run(case) for case in sorted(beyond)]
+    return Prepared([*tasks(definition, rest), *fulls], model)
 
 
 def count_held(ordered: Sequence[int], failing: Callable[[Iterable[int]], set[int]]) -> int:
@@ -319,12 +361,11 @@ def count_held(ordered: Sequence[int], failing: Callable[[Iterable[int]], set[in
     return held
 
 
-def compared(modes: int, fulls: Sequence[Outcome], models: Sequence[Outcome]) -> ReducedModel:
+def compared(modes: int, full: Outcome, model: Outcome) -> ReducedModel:
     """Compare outcomes of the trials.
 
     Raises CasesError if all failed.
     """
-    full, model = merge(fulls, history=False), merge(models, history=False)
     fine = np.flatnonzero(full.fine & model.fine)
     if not len(fine):
         (failed, *_) = (outcome for outcome in (model, full) if not outcome.fine.all())

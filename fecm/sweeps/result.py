@@ -26,7 +26,6 @@ from fecm.results.written import Reported, Saved
 from fecm.sweeps import reduced as reduced_check
 from fecm.sweeps.files import FORCE, random_of
 from fecm.sweeps.outcome import About, Column, Outcome
-from fecm.sweeps.plan import Plan
 from fecm.sweeps.reduced import ReducedModel
 from fecm.sweeps.statistics import evaluate
 from fecm.sweeps.stored import StoredSweep
@@ -37,6 +36,7 @@ from fecm.sweeps.summary import (
     sweep_rows,
     sweep_verdict,
 )
+from fecm.sweeps.task import Plan
 
 if TYPE_CHECKING:
     import pandas

@@ -1,0 +1,396 @@
+"""Methods that compute the cases of a sweep, and the choice of one.
+
+A linear plate is stepped once under a unit force, and every impact follows by convolution with its
+response. A nonlinear plate is run in full for each impact, or reduced to some bending modes. All
+that a sweep asks about the computation of its cases is answered by its :class:`Method`: how they
+are split into tasks, what they cost, and why a plan is refused.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm._watch import Watch
+from fecm.authoring.case import NO_THRESHOLD, PEAK_FORCE, THRESHOLD, Case, CasesError, Value
+from fecm.authoring.impacts import Impacts, impacts_from_cards, impacts_of
+from fecm.authoring.strike import strike_of
+from fecm.authoring.timing import with_clock
+from fecm.authoring.values import FAILURE_NAMES, REFINE, apply_case
+from fecm.deck.model import Nonlinear
+from fecm.mechanics.kernels import LIBRARY
+from fecm.mechanics.own_law import law_name
+from fecm.problem.memory import needed_bytes, reduction_bytes
+from fecm.problem.problem import Problem
+from fecm.sweeps.backends import (
+    FORCES,
+    BendingModes,
+    FullRuns,
+    ImpulseResponse,
+    only_impacts,
+    shares_plate,
+)
+from fecm.sweeps.in_full import (
+    as_run,
+    problem_of_case,
+    run_in_full,
+    stores_rows,
+    thresholds_of,
+    with_hit,
+    without_output,
+)
+from fecm.sweeps.outcome import About, Backend, Outcome, Status, merge
+from fecm.sweeps.price import expected, work_of_plates, work_of_runs
+from fecm.sweeps.random import cost_of_plates, cost_of_runs
+from fecm.sweeps.reduced import MOST_MODES, tasks_beside_full_runs
+from fecm.sweeps.search import FIRST_VELOCITIES, Sought, search
+from fecm.sweeps.task import (
+    MOST_TOGETHER,
+    Measure,
+    Method,
+    Plan,
+    Prepared,
+    RunTasks,
+    Settings,
+    Task,
+)
+
+MOST_REDUCED = 256  # impacts on a reduced plate at once, whose steps cost more
+MOST_IN_MOTION = 16  # full runs in one motion
+
+
+class _OnSharedPlate(Method):
+    """Cases of one plate are impacts on it that a back end advances together."""
+
+    def backend(self, problem: Problem, settings: Settings) -> Backend:
+        """Return the back end of a plate."""
+        raise NotImplementedError
+
+    def outcomes(self, task: Task) -> list[Outcome]:
+        """Compute cases that share a plate."""
+        of_plate = task.plate_values
+        # What computes the plate's response does not depend on the search and the contact law.
+        settings = replace(task.settings, search=None, law=None)
+        try:
+            problem, backend = _plate(self, settings, tuple(of_plate.items()))
+        except CasesError as error:
+            return [Outcome.failed(dict.fromkeys(task.numbers, str(error)))]
+        impacts, reasons = impacts_of(problem, task.numbers, task.cases, task.settings.law)
+        parts = [Outcome.failed(reasons)]
+        if impacts is not None:
+            outcome = _outcome(task.settings, problem, backend, impacts)
+            parts.append(with_hit(outcome, problem, of_plate))
+        return parts
+
+    def work(self, checked: Problem, definition: Plan) -> tuple[int, float]:
+        """Return the steps of the plates, and the seconds from the first cases."""
+        return work_of_plates(checked, definition)
+
+    def expectation(self, checked: Problem, definition: Plan, workers: int | None) -> list[str]:
+        """Say how many plates random values need."""
+        design = definition.design
+        return [] if design is None else [cost_of_plates(definition.cases, design)]
+
+    def process_bytes(self, checked: Problem, settings: Settings, *, exact: bool) -> int:
+        """Return the memory of the plate's run."""
+        return needed_bytes(
+            without_output(checked, settings.measures), in_memory=False, exact=exact
+        )
+
+
+@lru_cache(maxsize=2)
+def _plate(
+    method: _OnSharedPlate, settings: Settings, of_plate: tuple[tuple[str, Value], ...]
+) -> tuple[Problem, Backend]:
+    """Return the problem of a plate, given by values of names, and its back end."""
+    case: Case = dict(of_plate)
+    problem = with_clock(apply_case(settings.deck, case), settings.clock, case)
+    return problem, method.backend(problem, settings)
+
+
+@dataclass(frozen=True)
+class SharedResponse(_OnSharedPlate):
+    """Impacts on a linear plate by convolution with its response."""
+
+    def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
+        """Return whether cases are impacts on linear plates that do nothing else."""
+        is_run = settings.build is not None or settings.has_exposures
+        return not is_run and shares_plate(checked, names)
+
+    def backend(self, problem: Problem, settings: Settings) -> Backend:
+        """Return the back end of a plate."""
+        return ImpulseResponse(problem, settings.measures, settings.history)
+
+    def most_cases(self, definition: Plan) -> int:
+        """Return the number of cases whose runs are advanced together."""
+        return max(1, _runs_together(definition) // _runs_of_case(definition))
+
+    def most_forces(self, definition: Plan, steps: int) -> int:
+        """Return the number of runs; the kernels are given fewer runs of many steps at a time."""
+        settings, together = definition.settings, _runs_together(definition)
+        if settings.history or LIBRARY is None or settings.law is not None:
+            return together
+        return min(together, max(1, FORCES // steps))
+
+
+def _runs_together(definition: Plan) -> int:
+    """Return the largest number of runs that are advanced together."""
+    return min(MOST_TOGETHER, len(definition.cases) * _runs_of_case(definition))
+
+
+def _runs_of_case(definition: Plan) -> int:
+    """Return the number of runs of a case in the first round of a search."""
+    return 1 if definition.settings.search is None else FIRST_VELOCITIES
+
+
+@dataclass(frozen=True)
+class ReducedModes(_OnSharedPlate):
+    """Impacts on a nonlinear plate in some bending modes, beside full runs of some cases."""
+
+    def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
+        """Return whether the caller asks for the reduced model."""
+        return settings.modes is not None
+
+    def refusal(self, checked: Problem, definition: Plan) -> str:
+        """Explain why the reduced model does not suit a plan; empty if it does."""
+        settings, names, modes = definition.settings, definition.cases[0], definition.settings.modes
+        if settings.law is not None:
+            return (
+                f"the contact law {law_name(settings.law)} takes the place of EXPE, which the "
+                "reduced model needs: leave out the reduced model"
+            )
+        if not (isinstance(modes, int) and 1 <= modes <= MOST_MODES):
+            return f"the reduced model takes 1 to {MOST_MODES} bending modes, not {modes!r}"
+        if {*settings.measures} - {Measure.DEFLECTION}:
+            return (
+                "the reduced model has forces and deflections only, of a deck: no build, and none "
+                "of measure but max_deflection"
+            )
+        if REFINE in names or "dt" in names:
+            return "the reduced model has a time step of its own: dt and refine can't vary"
+        if not checked.deck.has(Nonlinear):
+            return "the reduced model is for decks with NONL; cases of others share a run"
+        if not only_impacts(checked):
+            return (
+                "the reduced model starts at rest, with impact steps of one size: the deck has "
+                "other steps, nodal forces or prescribed displacements"
+            )
+        return ""
+
+    def backend(self, problem: Problem, settings: Settings) -> Backend:
+        """Return the back end of a plate."""
+        return BendingModes(problem, settings.measures, _modes(settings), settings.history)
+
+    def most_cases(self, definition: Plan) -> int:
+        """Return the number of cases that are advanced together."""
+        return min(MOST_REDUCED, len(definition.cases))
+
+    def prepared(self, definition: Plan, run: RunTasks, watch: Watch) -> Prepared:
+        """Compare the model with full runs; cases for which it does not hold are run in full."""
+        modes = _modes(definition.settings)
+        return tasks_beside_full_runs(definition, SEPARATE_RUNS, modes, run, watch)
+
+    def process_bytes(self, checked: Problem, settings: Settings, *, exact: bool) -> int:
+        """Return the memory of a full run, or of the reduction if it takes more."""
+        run = super().process_bytes(checked, settings, exact=exact)
+        return max(run, reduction_bytes(checked.plate, _modes(settings)))
+
+    def most_forces(self, definition: Plan, steps: int) -> int:
+        """Return the number of cases that are advanced together."""
+        return self.most_cases(definition)
+
+
+def _modes(settings: Settings) -> int:
+    assert settings.modes is not None  # the method applies
+    return settings.modes
+
+
+class _InFull(Method):
+    """Cases are run in full on any plate."""
+
+    shared: Collection[str] = ()  # names of values in which cases of one run may differ
+
+    def work(self, checked: Problem, definition: Plan) -> tuple[int, float]:
+        """Return the steps of all runs, and the seconds from the first steps."""
+        return work_of_runs(checked, definition)
+
+    def expectation(self, checked: Problem, definition: Plan, workers: int | None) -> list[str]:
+        """Say that random values are run in full, and the runs of a nonlinear plate."""
+        cases, design, texts = definition.cases, definition.design, []
+        if design is not None:
+            texts.append(cost_of_runs(cases, design, self.shared))
+        if definition.settings.build is None and checked.plate.nonlinear:
+            texts.append(expected(checked, definition, workers))
+        return texts
+
+    def process_bytes(self, checked: Problem, settings: Settings, *, exact: bool) -> int:
+        """Return the memory of a run with the rows that it keeps."""
+        program = as_run(checked, settings.measures, settings.measure)
+        keeps_rows = settings.measure is not None or stores_rows(checked, settings.measures)
+        return needed_bytes(program, in_memory=keeps_rows, exact=exact)
+
+    def most_forces(self, definition: Plan, steps: int) -> int:
+        """Return 1: a run has the forces of all its cases."""
+        return 1
+
+
+@dataclass(frozen=True)
+class SharedMotion(_InFull):
+    """Full runs; cases that differ only in values of failure have one motion."""
+
+    shared = FAILURE_NAMES
+
+    def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
+        """Return whether cases of a deck are run in full, each once and without a function."""
+        obstacles = settings.build, settings.measure, settings.search
+        in_full = settings.has_exposures or checked.deck.has(Nonlinear)
+        return in_full and all(other is None for other in obstacles)
+
+    def most_cases(self, definition: Plan) -> int:
+        """Return the number of cases whose failure one run evaluates."""
+        return MOST_IN_MOTION
+
+    def separates(self, name: str) -> bool:
+        """Return whether the motion depends on a value."""
+        return name not in self.shared
+
+    def outcomes(self, task: Task) -> list[Outcome]:
+        """Run the motion of all cases once."""
+        settings = task.settings
+        problems: dict[int, Problem] = {}
+        reasons: dict[int, str] = {}
+        for number, case in zip(task.numbers, task.cases, strict=True):
+            try:
+                problems[number] = problem_of_case(settings, case)
+            except CasesError as error:
+                reasons[number] = str(error)
+        invalid = [Outcome.failed(reasons)] if reasons else []
+        if not problems:
+            return invalid
+        try:
+            outcomes = run_in_full(problems, settings.measures, law=settings.law)
+        except CasesError as error:
+            return [*invalid, Outcome.failed(dict.fromkeys(problems, str(error)))]
+        cases = dict(zip(task.numbers, task.cases, strict=True))
+        for outcome in outcomes:
+            for number in outcome.numbers:
+                with_hit(outcome, problems[number], cases[number])
+        return [*invalid, *outcomes]
+
+
+@dataclass(frozen=True)
+class SeparateRuns(_InFull):
+    """Full runs of each case, on a plate of its own, also by functions and for searches."""
+
+    def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
+        """Return True: any case can be run alone."""
+        return True
+
+    def most_cases(self, definition: Plan) -> int:
+        """Return 1."""
+        return 1
+
+    def outcomes(self, task: Task) -> list[Outcome]:
+        """Run each case, or search its velocity."""
+        cases = zip(task.numbers, task.cases, strict=True)
+        return [_alone(task.settings, number, case) for number, case in cases]
+
+    def work(self, checked: Problem, definition: Plan) -> tuple[int, float]:
+        """Return the work of runs; the seconds of decks that a function builds are not known."""
+        if definition.settings.build is not None:
+            return checked.work.steps * len(definition.cases), math.nan
+        return super().work(checked, definition)
+
+
+def _alone(settings: Settings, number: int, case: Case) -> Outcome:
+    """Compute a case on its own plate by full runs."""
+    try:
+        problem = problem_of_case(settings, case)
+        if settings.search is not None:
+            outcome = _searched_alone(settings, number, problem)
+        else:
+            (outcome,) = run_in_full(
+                {number: problem}, settings.measures, settings.measure, case, law=settings.law
+            )
+    except CasesError as error:
+        return Outcome.failed({number: str(error)})
+    return outcome if settings.build else with_hit(outcome, problem, case)
+
+
+def _searched_alone(settings: Settings, number: int, problem: Problem) -> Outcome:
+    """Find the velocity of a case by full runs."""
+    assert settings.search is not None
+    strikes = {number: strike_of(problem.deck)}
+    impacts = impacts_from_cards(strikes, settings.law, problem.symmetry.factor)
+    levels = _levels(settings, problem, impacts)
+    if settings.search.quantity is Sought.EXPOSURE:
+        at_rest = problem.worst_at_rest
+        if at_rest is not None and at_rest.exposure >= levels[0]:
+            raise CasesError(f"the plate at rest has the exposure {at_rest.exposure:.4g}")
+    elif problem.deck.has(Nonlinear):
+        impacts = _from_quick_models(problem, impacts, levels)
+    return search(FullRuns(problem, settings.measures), impacts, settings.search.quantity, levels)
+
+
+def _outcome(settings: Settings, problem: Problem, backend: Backend, impacts: Impacts) -> Outcome:
+    """Compute impacts on a plate, or find their velocities."""
+    if settings.search is None:
+        outcome = backend.lengthened(backend.durations[0]).outcomes(impacts)
+        return _lengthened(outcome, backend, impacts, settings) if backend.lengthens else outcome
+    levels = _levels(settings, problem, impacts)
+    return search(backend, impacts, settings.search.quantity, levels)
+
+
+def _levels(settings: Settings, problem: Problem, impacts: Impacts) -> Floats:
+    """Return the peak forces that a search must reach, (rows,)."""
+    assert settings.search is not None
+    level = settings.search.level
+    if level != THRESHOLD:
+        return np.full(len(impacts), float(level))
+    if (thresholds := thresholds_of(problem, impacts.toughness)) is None:
+        raise CasesError(NO_THRESHOLD)
+    return thresholds
+
+
+def _lengthened(
+    outcome: Outcome, backend: Backend, impacts: Impacts, settings: Settings
+) -> Outcome:
+    """Repeat impacts that end between contacts, or may touch again, with a longer response."""
+    no_contact = outcome.columns[About.STATUS] == Status.OK
+    candidates = np.array(outcome.numbers)[no_contact]
+    for factor in backend.durations[1:]:
+        is_open = np.isin(outcome.numbers, candidates) & np.isnan(outcome.columns[PEAK_FORCE])
+        if not is_open.any():
+            break
+        again = np.flatnonzero(np.isin(impacts.numbers, np.array(outcome.numbers)[is_open]))
+        longer = backend.lengthened(factor).outcomes(impacts.select(again))
+        parts = [outcome.select(np.flatnonzero(~is_open)), longer]
+        outcome = merge(parts, history=settings.history)
+    return outcome
+
+
+def _from_quick_models(problem: Problem, impacts: Impacts, levels: Floats) -> Impacts:
+    """Return impacts on a nonlinear plate at the velocities that the quick models estimate."""
+    from fecm.studies.estimate import velocity_at  # 0.1 s, which most sweeps don't need
+
+    rows = np.arange(len(impacts))
+    starts = [
+        velocity_at(replace(problem, deck=impacts.deck(row)), float(levels[row]))
+        for row in rows.tolist()
+    ]
+    return replace(impacts.at_velocities(rows, np.array(starts)), numbers=impacts.numbers)
+
+
+SEPARATE_RUNS = SeparateRuns()
+# The first one that applies computes a plan.
+METHODS: tuple[Method, ...] = (ReducedModes(), SharedMotion(), SharedResponse(), SEPARATE_RUNS)
+
+
+def method_of(checked: Problem, settings: Settings, names: Collection[str]) -> Method:
+    """Return the method for cases of a problem, whose values have these names."""
+    return next(method for method in METHODS if method.applies(checked, settings, names))
