@@ -20,6 +20,9 @@ R = TypeVar("R")
 T = TypeVar("T")
 
 PLACE = "{parameters}"  # of the parameters in a docstring
+# Parameters in the docstring of a job, and one of them.
+SECTION = re.compile(r"Parameters\n +-+\n +(.*?)(?=\n\n|\s*\Z)", re.S)
+ENTRY = r"^ *{}\b[^\n]* : .*\n(?:        .*\n?)+"
 WIDTH = 92
 
 
@@ -76,6 +79,29 @@ def _parameters(job: Any) -> str:
     return textwrap.indent("\n".join(lines), "    ").strip()
 
 
+def described_by(job: Any) -> Callable[[T], T]:
+    """Take the texts of parameters in the docstring of a function from its job.
+
+    ``{parameters}`` is the place of all parameters, ``{name}`` that of a single one.
+    """
+
+    def text_of(place: re.Match[str]) -> str:
+        section = SECTION.search(job.__doc__)
+        assert section is not None
+        if place[0] == PLACE:
+            return section[1]
+        entry = re.search(ENTRY.format(place[1]), section[1], re.M)
+        assert entry is not None, place[1]
+        return entry[0].strip()
+
+    def decorate(function: T) -> T:
+        if function.__doc__ and job.__doc__:  # Python without docstrings has none
+            function.__doc__ = re.sub(r"\{(\w+)\}", text_of, function.__doc__)
+        return function
+
+    return decorate
+
+
 def with_parameters_of(job: Callable[P, J]) -> Callable[[Callable[[J], R]], Callable[P, R]]:
     """Give a function the signature and the documented parameters of a job."""
 
@@ -87,8 +113,6 @@ def with_parameters_of(job: Callable[P, J]) -> Callable[[Callable[[J], R]], Call
         returns = inspect.signature(function).return_annotation
         signature = inspect.signature(job).replace(return_annotation=returns)
         called.__signature__ = signature  # type: ignore[attr-defined]
-        if called.__doc__:
-            called.__doc__ = re.sub(PLACE, lambda _: _parameters(job), called.__doc__)
-        return called
+        return described_by(job)(called)
 
     return decorate

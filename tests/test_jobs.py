@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import os
+import re
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -259,6 +261,27 @@ def test_the_command_has_the_options_of_the_job_with_their_help(command: str, jo
             assert flag.replace("/", " / ") in page
             assert about.help.split(".")[0].split("-")[0] in page
         assert f"{name} : " in (job.__doc__ or "")
+
+
+@pytest.mark.parametrize(
+    ("function", "job"),
+    [
+        (fecm.run, fecm.Run),
+        (fecm.sweep, fecm.Sweep),
+        (fecm.identify, fecm.IdentificationJob),
+        (fecm.locate, fecm.LocationJob),
+    ],
+)
+def test_a_function_says_of_its_parameters_what_its_job_says(
+    function: Callable[..., object], job: type
+) -> None:
+    texts = str(job.__doc__)
+    shared = inspect.signature(function).parameters.keys() & inspect.signature(job).parameters
+    assert len(shared) >= 4
+    for name in shared:
+        entry = re.search(rf"^    [\w, ]*\b{name}\b.* : .*\n(?: {{8}}.*\n)+", texts, re.M)
+        assert entry is not None, name
+        assert entry[0] in str(function.__doc__)
 
 
 def test_the_page_has_the_table_of_what_excludes_what() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fecm._errors import warn
-from fecm._options import documented, option
+from fecm._options import described_by, documented, option
 from fecm._table import Table, html_table
 from fecm._typing import Floats
 from fecm._watch import SILENT, StoppedError, Watch
@@ -225,6 +225,7 @@ class IdentificationJob:
         return html_table(Table(rows, title=repr(self)[1:-1]))
 
 
+@described_by(IdentificationJob)
 def identify(
     deck: AnyDeck,
     time: Any,
@@ -240,19 +241,13 @@ def identify(
 
     Parameters
     ----------
-    deck : str, Path or Deck
-        Deck with a single problem.
+    {deck}
     time, force : array_like (points,)
         Measured contact force, positive in compression, at increasing times, in the deck's units.
         At time 0 the projectile touches the plate, as in the deck.
-    free : str or sequence of str
-        Parameters to fit; see :class:`IdentificationJob`.
-    filter : str, optional
-        Filter of the measurement, which is applied to the computed force: ``"first-order:RISE"``,
-        ``"moving-average:RISE"``, ``"butterworth:ORDER,FREQUENCY[,zero-phase]"`` in Hz, or
-        ``"cfc:CLASS"``.
-    law : Law or str, optional
-        Contact law that replaces EXPE, as in :func:`run`.
+    {free}
+    {filter}
+    {law}
 
     Returns
     -------

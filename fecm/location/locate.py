@@ -202,12 +202,6 @@ def locate(job: LocationJob) -> Location:
 
     Parameters
     ----------
-    deck : str, Path or Deck
-        Deck with a single problem: plate, supports, GAGE, and PATC, the circle on which the force
-        acts.
-    strains : str, Path, tuple, mapping or DataFrame
-        Measured strains: a CSV file with a column time and a column per gage; times and strains
-        (points, gages); or columns by name.
     {parameters}
 
     Returns

@@ -596,8 +596,6 @@ def run(job: Run) -> Result | list[Result]:
 
     Parameters
     ----------
-    deck : str, Path, file or Deck
-        A file's path, a deck's text, an open file, or a model built in Python.
     {parameters}
 
     Returns

@@ -665,8 +665,6 @@ def sweep(job: Sweep) -> SweepResult:
 
     Parameters
     ----------
-    deck : str, Path or Deck
-        Deck with a single problem; not with `build`.
     {parameters}
 
     Returns
