@@ -215,3 +215,4 @@ def test_no_contact_is_estimated_on_a_fabric() -> None:
     made = new("--fixture", "D7136", *PLATE[:4], "--material", "AS4-5H/3501-6", *QUICK)
     assert_unusable(made)
     assert "the ply is a fabric" in made.stderr
+    assert "`fecm indent hertz --et E3`" in made.stderr

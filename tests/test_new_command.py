@@ -616,3 +616,19 @@ def test_rows_of_ply_stresses_have_displacements_for_paraview(every: tuple[str, 
     assert numbers["PLYS"] % numbers["DISP"] == 0
     rows = numbers["LOOP"] // numbers["PLYS"]
     assert 20 <= rows <= 22 or numbers["PLYS"] == numbers["DISP"]
+
+
+@pytest.mark.parametrize(
+    ("options", "remedy"),
+    [
+        (("--projectile", "mass:5.5kg"), "mm, N and s have the mass in t, 1 kg = 1e-3 t"),
+        (("--pressure", "5"), "No such option '--pressure'; see fecm new --help"),
+        (("--velocty", "5"), "Did you mean '--velocity'?"),
+    ],
+)
+def test_a_slip_on_the_command_line_ends_with_its_remedy(
+    options: tuple[str, ...], remedy: str
+) -> None:
+    refused = call("new", *options)
+    assert refused.exit_code == 2
+    assert remedy in refused.stderr

@@ -175,6 +175,10 @@ def _status(arguments: Sequence[str] | None, prog_name: str) -> int:
     except SystemExit as left:
         return left.code if isinstance(left.code, int) else 0
     except click.ClickException as error:
+        if isinstance(error, click.NoSuchOption) and error.possibilities:
+            name = error.option_name.lstrip("-")  # click compares the dashes too
+            similar = [o for o in error.possibilities if did_you_mean(name, [o.lstrip("-")])]
+            error.possibilities[:] = similar
         context = error.ctx if isinstance(error, click.UsageError) else None
         if context is not None and error.message == context.get_help():
             echo(error.message, err=True)  # the name of a command is missing

@@ -127,6 +127,9 @@ MOST_CHOICES = 8  # that a help page lists in the place of the value
 WITH_UNIT = re.compile(r"[+-]?(\d+(?:\.\d*)?|\.\d+)([eE][+-]?\d+)?\s*[a-zA-Zµμ/]*[a-zA-Zµμ]")
 
 
+GRAMS = ("g", "lb", "lbs")  # ends of units of mass, kg too
+
+
 class Finite(click.FloatRange):
     """Finite float in a range."""
 
@@ -136,6 +139,8 @@ class Finite(click.FloatRange):
         """Parse a number."""
         if isinstance(value, str) and WITH_UNIT.fullmatch(value.strip()):  # 5.5kg
             message = f"{value!r} has a unit; give the number alone, in the deck's units"
+            if value.strip().endswith(GRAMS):
+                message += " (mm, N and s have the mass in t, 1 kg = 1e-3 t)"
             self.fail(message, param, ctx)
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):

@@ -43,7 +43,10 @@ def ply_stiffness(ply: PlyConstants, nu23: float) -> Floats:
             "exchanged"
         )
     if is_fabric(ply):
-        raise PlyError("the ply is a fabric (E2 near E1, G12 far below): its E3 is not its E2")
+        raise PlyError(
+            "the ply is a fabric (E2 near E1, G12 far below): its E3 is not its E2; with a known "
+            "E3, `fecm indent hertz --et E3` computes k"
+        )
     compliance = np.zeros((6, 6))
     compliance[:3, :3] = [
         [1.0 / e1, -nu12 / e1, -nu12 / e1],
