@@ -71,6 +71,11 @@ def html_table(*tables: Table) -> str:
     return "".join(map(_html, tables))
 
 
+def html_summary(subject: object, rows: Iterable[Row]) -> str:
+    """Return labels and values of a subject as HTML, under its ``repr``, for notebooks."""
+    return html_table(Table(tuple(rows), title=repr(subject)[1:-1]))
+
+
 def _html(table: Table) -> str:
     from html import escape  # 1 ms, only in notebooks
 

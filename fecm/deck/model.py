@@ -13,7 +13,7 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, TypeVar, Unpack
 
 from fecm._methods import function_of
-from fecm._table import Table, html_table
+from fecm._table import html_summary
 from fecm.deck.card import Control, Record
 from fecm.deck.impact_cards import Impact, Indentation, Patch, Projectile, RodDiameter
 from fecm.deck.macros import LoadTable, Macro
@@ -138,7 +138,7 @@ class Deck(Record):
         segments = " ".join(segment.keyword for segment in self.segments)
         macros = " ".join(macro.word for macro in self.macros)
         rows = (("segments", shorten(segments, 200)), ("macros", shorten(macros, 200)))
-        return html_table(Table(rows, title=repr(self)[1:-1]))
+        return html_summary(self, rows)
 
     def has(self, kind: type[Segment]) -> bool:
         """Return whether the deck has a segment of one kind."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from fecm._errors import warn
 from fecm._options import described_by, documented, option
-from fecm._table import Table, html_table
+from fecm._table import html_summary
 from fecm._typing import Floats
 from fecm._watch import SILENT, StoppedError, Watch
 from fecm.authoring.strike import lacks_value, strike_of
@@ -222,7 +222,7 @@ class IdentificationJob:
     def _repr_html_(self) -> str:
         """Return a table of the title and the price, for notebooks."""
         rows = (("title", self.problem.deck.title), ("price", str(self.price)))
-        return html_table(Table(rows, title=repr(self)[1:-1]))
+        return html_summary(self, rows)
 
 
 @described_by(IdentificationJob)

@@ -11,7 +11,7 @@ import numpy as np
 
 from fecm._errors import FecmError, StudyError, warn
 from fecm._options import documented, with_parameters_of
-from fecm._table import Table, html_table
+from fecm._table import html_summary
 from fecm._typing import Floats
 from fecm._watch import SILENT, StoppedError, Watch
 from fecm.deck.model import Gages, Nonlinear
@@ -190,7 +190,7 @@ class LocationJob(LocationOptions):
     def _repr_html_(self) -> str:
         """Return a table of the title and the price, for notebooks."""
         rows = (("title", self.problem.deck.title), ("price", str(self.price)))
-        return html_table(Table(rows, title=repr(self)[1:-1]))
+        return html_summary(self, rows)
 
 
 @with_parameters_of(LocationJob)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fecm._arrays import read_only
 from fecm._errors import FecmError, OptionsError, ResultFileError
-from fecm._table import Row, Table, html_table, text_lines
+from fecm._table import Row, Table, html_summary, text_lines
 from fecm._text import FITTED_DIGITS
 from fecm._typing import AnyFile, Bools, Floats
 from fecm.deck.model import Deck
@@ -340,7 +340,7 @@ class Location(Saved):
     def _repr_html_(self) -> str:
         """Return a table of the location and its notes, for notebooks."""
         rows = (*location_table(self).rows, *(("note", note) for note in self.notes))
-        return html_table(Table(rows, title=repr(self)[1:-1]))
+        return html_summary(self, rows)
 
     def _file_attributes(self) -> dict[str, Any]:
         """Return the attributes of the file."""

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, NamedTuple, TypedDict
 
-from fecm._table import Row, Table, html_table
+from fecm._table import Row, html_summary
 from fecm._text import printable, shown_apart
 
 MAX = "max"  # the usual scale of differences, in words
@@ -337,7 +337,7 @@ class Difference:
         rows += ((name, "only in A") for name in self.only_in_a)
         rows += ((name, "only in B") for name in self.only_in_b)
         rows += (("listed", str(item)) for item in self.listed)
-        return html_table(Table(tuple(rows), title=repr(self)[1:-1]))
+        return html_summary(self, rows)
 
     def lines(self, *, same: bool = True) -> list[str]:
         """Return one line per dataset, the listed items, and the verdict.

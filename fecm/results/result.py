@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from fecm._errors import ResultFileError, warn
-from fecm._table import Table, html_table
+from fecm._table import html_summary
 from fecm._text import Decimal
 from fecm._typing import AnyFile, Floats
 from fecm.deck.model import Deck
@@ -372,7 +372,7 @@ class Result(Stored, Saved, Reported, schema.ContactRows, MetricAttributes):
         from fecm.results.summary import run_table  # 4 ms at start
 
         notes = tuple(("note", note) for note in self.notes)
-        return html_table(Table(run_table(self).rows + notes, title=repr(self)[1:-1]))
+        return html_summary(self, run_table(self).rows + notes)
 
 
 def load(path: str | Path | AnyFile) -> Result:

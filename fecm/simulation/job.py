@@ -16,7 +16,7 @@ from fecm._errors import FecmError, OptionsError, warn
 from fecm._files import OutputError, check_outputs, open_for_writing
 from fecm._machine import format_bytes
 from fecm._options import documented, option, with_parameters_of
-from fecm._table import Row, Table, html_table
+from fecm._table import Row, html_summary
 from fecm._watch import LOGGER, SILENT, CallerWatch, Progress, StoppedError, Watch
 from fecm.deck.findings import Finding
 from fecm.deck.macros import EXTENDED, extended
@@ -412,7 +412,7 @@ class Run:
         for job in self.problems:
             rows += [("title", job.problem.deck.title), ("price", str(job.price))]
             rows += [("result", str(job.path))] * (job.path is not None)
-        return html_table(Table(tuple(rows), title=repr(self)[1:-1]))
+        return html_summary(self, rows)
 
 
 @dataclass(eq=False, repr=False)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from fecm._files import check_outputs
 from fecm._options import documented, option, with_parameters_of
-from fecm._table import Row, Table, html_table
+from fecm._table import Row, html_summary
 from fecm._watch import LOGGER, CallerWatch, Progress, Watch
 from fecm.authoring.case import Case, CasesError, Limit, parse_exceed
 from fecm.authoring.cases import (
@@ -550,7 +550,7 @@ class Sweep:
         rows: list[Row] = [("title", self.title), ("names", names), ("price", str(self.price))]
         rows += [("result", str(self.path))] * (self.path is not None)
         rows += (("doubt", text) for text in self.doubts)
-        return html_table(Table(tuple(rows), title=repr(self)[1:-1]))
+        return html_summary(self, rows)
 
 
 def _loaded(deck: AnyDeck) -> LoadedDeck:

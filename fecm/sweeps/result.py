@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fecm._errors import ResultFileError
 from fecm._files import check_outputs, open_for_writing
-from fecm._table import Table, html_table
+from fecm._table import html_summary
 from fecm._text import Decimal
 from fecm._typing import AnyFile
 from fecm.authoring.cases import MEASURED
@@ -90,7 +90,7 @@ class SweepResult(StoredSweep, Saved, Reported):
 
     def _repr_html_(self) -> str:
         """Return a table of the summary, for notebooks."""
-        return html_table(Table(tuple(sweep_rows(self)), title=repr(self)[1:-1]))
+        return html_summary(self, sweep_rows(self))
 
     @property
     def notes(self) -> tuple[str, ...]:
