@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
 
+import h5py
 import pytest
 
 import fecm
@@ -51,6 +52,19 @@ def call(*arguments: object, cwd: Path | None = None) -> Done:
         main(list(map(str, arguments)))
     assert isinstance(left.value.code, int)
     return Done(left.value.code, _written(out), _written(err))
+
+
+def datasets_of(path: Path) -> list[str]:
+    """Return the paths of all datasets in the groups of a file."""
+    paths: list[str] = []
+
+    def visit(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset) and "/" in name:  # neither the deck nor a scale
+            paths.append(name)
+
+    with h5py.File(path) as file:
+        file.visititems(visit)
+    return paths
 
 
 def program(*arguments: object, cwd: Path, **options: object) -> Done:

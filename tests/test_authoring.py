@@ -175,7 +175,7 @@ def test_a_named_ply_is_converted_between_systems_of_units() -> None:
 
 @pytest.mark.parametrize(
     ("support", "w", "theta_x", "theta_y"),
-    [("free", 0, 0, 0), ("simple", 1, 0, 1), ("clamped", 1, 1, 1)],
+    [("free", 0, 0, 0), ("simple", 1, 0, 1), ("pinned", 1, 0, 1), ("clamped", 1, 1, 1)],
 )
 def test_supports_hold_what_their_names_say(
     support: str, w: int, theta_x: int, theta_y: int

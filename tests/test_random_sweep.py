@@ -496,7 +496,7 @@ def test_bad_input_is_one_line(folder: Path, options: tuple[object, ...], told: 
             },
             "no quantity `contakts`",
         ),
-        ({"random": {"k": "uniform:1,2"}, "samples": 16, "design": "halton"}, "lhs, sobol, mc"),
+        ({"random": {"k": "uniform:1,2"}, "samples": 16, "design": "halton"}, ", ".join(DESIGNS)),
         ({"random": {"k": "uniform:1,2"}, "cases": [{"q": 2.0}]}, "`cases` excludes `random`"),
         ({"random": {"case": "uniform:1,2"}, "samples": 16, "build": len}, "name of the results"),
     ],

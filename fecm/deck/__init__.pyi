@@ -17,6 +17,7 @@ from fecm.deck.findings import DeckError as DeckError
 from fecm.deck.findings import Finding as Finding
 from fecm.deck.findings import Findings as Findings
 from fecm.deck.format import format_deck as format_deck
+from fecm.deck.grid import SUPPORTS as SUPPORTS
 from fecm.deck.grid import ElementGrid as ElementGrid
 from fecm.deck.grid import GridSection as GridSection
 from fecm.deck.grid import boundary_cards as boundary_cards
