@@ -280,27 +280,6 @@ def make_folder(folder: Path) -> None:
             raise OutputError(f"{folder} is {what}; remove it") from None
 
 
-@contextlib.contextmanager
-def held(folder: Path, message: str) -> Iterator[None]:
-    """Create a folder unless it exists, and lock it.
-
-    Raises OutputError with this message if another process holds the lock, and with another message
-    if the folder can't be used; see :func:`make_folder`.
-    """
-    make_folder(folder)
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-    except PermissionError:  # Windows opens no folders
-        yield
-        return
-    try:
-        if not _lock(handle):
-            raise OutputError(message)
-        yield
-    finally:
-        os.close(handle)
-
-
 def _is(handle: int, path: Path) -> bool:
     """Return whether a path still leads to an open file."""
     try:

@@ -82,9 +82,9 @@ def _of_groups() -> list[int]:
 
 def format_bytes(count: float) -> str:
     """Format a number of bytes with a unit."""
-    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
-        if count >= size:
-            return f"{count / size:.3g} {unit}"
+    for unit, size in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if (rounded := float(f"{count / size:.3g}")) >= 1.0:
+            return f"{rounded:,.15g} {unit}"
     return f"{count:g} bytes"
 
 

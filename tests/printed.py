@@ -34,7 +34,7 @@ from tests.calls import call
 
 BLOCK = re.compile(r"^( *)```(\w+)\n(.*?)^ *```$|^#+ [^\n]*$", re.M | re.S)
 MASKED = re.compile(
-    r"\d[\d.,]* ?(?:kB|MB|GB|min|seconds|minutes|steps per second)\b"
+    r"\d[\d.,]* ?(?:kB|MB|GB|TB|min|seconds|minutes|steps per second)\b"
     r"|fecm \d[\w.+]*|about \d+ s\b|(?:/[\w.-]+){2,}"
 )
 GAP = "..."

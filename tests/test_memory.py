@@ -19,7 +19,7 @@ import fecm
 import fecm._machine
 import fecm.deck.reader
 import fecm.problem.memory
-from fecm._machine import NotEnoughMemoryError, available_memory
+from fecm._machine import NotEnoughMemoryError, available_memory, format_bytes
 from fecm.mechanics import critical_time_step
 from fecm.problem import build_plate, load_deck, needed_bytes
 from fecm.sweeps import ADVANCED_BYTES, HISTORY_BYTES, MOST_TOGETHER
@@ -471,3 +471,12 @@ def test_rows_of_a_file_are_read_without_the_others(
         stored = {"tape3/w": file.create_dataset("w", data=np.arange(12.0).reshape(6, 2))}
         rows = fecm.Result(stored, {}, {}).rows("tape3/w", 2, 4)
     assert rows.tolist() == [[4.0, 5.0], [6.0, 7.0]]
+
+
+@pytest.mark.parametrize(
+    ("count", "text"),
+    [(999, "999 bytes"), (999_600, "1 MB"), (123_456, "123 kB"), (999_900_000_000, "1 TB"),
+     (10**12, "1 TB"), (4 * 10**15, "4,000 TB")],
+)  # fmt: skip
+def test_bytes_have_the_unit_that_needs_no_exponent(count: int, text: str) -> None:
+    assert format_bytes(count) == text

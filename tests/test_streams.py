@@ -178,6 +178,52 @@ def test_control_characters_of_a_title_and_a_name_reach_no_terminal(
 
 
 @pytest.mark.linux
+def test_a_line_end_in_a_name_does_not_break_the_line(folder: Path) -> None:
+    (folder / "d.inp").rename(folder / "a\nb.inp")
+    ran = call("run", "a\nb.inp", cwd=folder)
+    assert ran.stdout.splitlines()[-1] == "  result            a\\nb.h5"
+    swept = call("sweep", "a\nb.inp", "--vary", "k=1e6", "-o", "c\nd.h5", cwd=folder)
+    assert "  result            c\\nd.h5" in swept.stdout.splitlines()
+    shutil.copy(folder / "a\nb.inp", folder / "c.inp")
+    several = call("check", "c.inp", "a\nb.inp", cwd=folder)
+    assert several.stdout.splitlines()[-1].startswith("a\\nb.inp: 2 warnings")
+    written = call("export", "a\nb.h5", "--to", "csv", cwd=folder)
+    assert written.stdout.startswith("a\\nb")
+
+
+def test_a_long_error_keeps_its_begin_and_its_end(folder: Path) -> None:
+    done = call("sweep", "d.inp", "--vary", f"{'x' * 5000}=1", cwd=folder)
+    assert done.exit_code == 2
+    assert done.stderr.startswith("fecm: error: ")
+    assert done.stderr.endswith("support, dt, duration\n")
+    assert " … " in done.stderr
+    assert len(done.stderr) < 1100
+
+
+@pytest.mark.linux
+@pytest.mark.parametrize("arguments", ["example drop-weight.inp", long("run {deck}")])
+def test_an_error_in_a_folder_that_was_removed_says_so(arguments: str, folder: Path) -> None:
+    gone = folder / "gone"
+    gone.mkdir()
+    deck = folder / "d.inp"
+    done = shell(f"cd {gone} && rmdir {gone} && $F {arguments.format(deck=deck)}", folder)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "fecm: error: the current folder does not exist any more; change to another one\n"
+    )
+
+
+@pytest.mark.linux
+@pytest.mark.long
+def test_a_picture_is_drawn_without_a_word_where_the_home_folder_is_missing(folder: Path) -> None:
+    pytest.importorskip("matplotlib")
+    assert call("run", "d.inp", cwd=folder).exit_code == 0
+    environment = {"HOME": "/proc", "XDG_CONFIG_HOME": "", "MPLCONFIGDIR": ""}
+    done = shell("$F plot d.h5", folder, **environment)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.linux
 def test_names_that_are_not_utf_8_work_in_every_command(folder: Path) -> None:
     deck, first, second = "\udcff.inp", "\udcff1.h5", "\udcff2.h5"
     (folder / "d.inp").rename(folder / deck)

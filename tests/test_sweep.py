@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import multiprocessing
 import os
 import re
 import signal
@@ -43,6 +44,7 @@ from fecm.sweeps import (
 from fecm.sweeps.plan import plan
 from tests.calls import Done, call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, model, small
+from tests.stopped_runs import StoppedError
 
 Floats = NDArray[np.float64]
 
@@ -368,6 +370,46 @@ def test_tasks_whose_workers_always_die_end_as_rows(monkeypatch: pytest.MonkeyPa
 
     on_workers(tasks(made), 2, note, lambda: None)
     assert lost == {0: LOST, 1: LOST}
+
+
+@pytest.mark.long
+@pytest.mark.posix
+def test_a_signal_to_workers_that_are_starting_costs_time_only(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """An interrupt of the terminal goes to all processes."""
+    problem = sole_problem(model(small()))
+    made = plan(problem, grid_cases([("layup", ["[0]", "[90]"])]))
+    numbers: list[int] = []
+    signals = [signal.SIGINT]
+
+    def interrupt() -> None:
+        while signals:
+            number = signals.pop()
+            for worker in multiprocessing.active_children():
+                os.kill(worker.pid or 0, number)
+
+    on_workers(tasks(made), 2, lambda task, outcome: numbers.append(task.number), interrupt)
+    assert sorted(numbers) == [0, 1]
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.long
+@pytest.mark.posix
+def test_workers_of_a_sweep_that_stops_while_they_start_end_without_a_word(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    problem = sole_problem(model(small()))
+    made = plan(problem, grid_cases([("layup", ["[0]", "[90]"])]))
+
+    def stop() -> None:
+        raise StoppedError("stopped")
+
+    with pytest.raises(StoppedError):
+        on_workers(tasks(made), 2, lambda task, outcome: None, stop)
+    for worker in multiprocessing.active_children():
+        worker.join()
+    assert capfd.readouterr().err == ""
 
 
 @pytest.fixture

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fecm._files import OutputError
+import fecm
+from fecm._files import OutputError, beside
 from fecm.authoring import grid_cases, with_time_step
 from fecm.problem import sole_problem
 from fecm.sweeps import (
@@ -29,13 +30,12 @@ from fecm.sweeps import (
     Plan,
     Task,
     carry_out_plan,
-    exclusive_result,
     execute,
     run_task,
     tasks,
 )
 from fecm.sweeps.plan import plan
-from tests.calls import assert_unusable, call
+from tests.calls import Done, assert_unusable, call
 from tests.decks import DATA_CARDS, model, small
 from tests.kill_runs import SWEEP, SWEPT
 
@@ -280,27 +280,42 @@ def test_nothing_is_read_or_deleted_through_a_folder_of_parts_that_is_a_link(
     assert after == before
 
 
-def test_a_file_with_the_name_of_the_folder_of_parts_is_refused(tmp_path: Path) -> None:
+def test_a_file_with_the_name_of_the_folder_of_parts_is_refused(made: Plan, tmp_path: Path) -> None:
     (tmp_path / ".s.h5.parts").write_text("precious")
-    with (
-        pytest.raises(OutputError, match="is not a folder; remove it"),
-        exclusive_result(tmp_path / "s.h5"),
-    ):
-        pass
+    with pytest.raises(OutputError, match="is not a folder; remove it"):
+        PartialResults(tmp_path / "s.h5", made.fingerprint())
     assert (tmp_path / ".s.h5.parts").read_text() == "precious"
 
 
-def test_two_sweeps_begun_at_once_do_not_write_the_same_parts(tmp_path: Path) -> None:
-    pytest.importorskip("fcntl")
+def test_a_sweep_does_not_begin_while_another_process_writes_its_output(tmp_path: Path) -> None:
     deck, result = tmp_path / "s.inp", tmp_path / "s.h5"
     deck.write_text(small())
-    command = ("sweep", deck, "--vary", "k=1e6", "-o", result)
-    with exclusive_result(result):
+    command = ("sweep", deck, "--vary", "k=1e6", "-o", result, "--overwrite")
+    with beside(result):
         refused = call(*command)
         assert_unusable(refused)
-        assert "s.h5 is being computed by another process" in refused.stderr
-        assert not result.exists()
+        assert "s.h5 is being written by another process" in refused.stderr
     assert call(*command).exit_code == 0
+
+
+@pytest.mark.parametrize("command", ["run", "sweep"])
+def test_no_other_command_writes_the_output_of_a_sweep_that_is_running(
+    command: str, tmp_path: Path
+) -> None:
+    deck, result = tmp_path / "s.inp", tmp_path / "s.h5"
+    deck.write_text(small())
+    others: list[Done] = []
+
+    def write_meanwhile(_: fecm.Result) -> dict[str, float]:
+        vary = ["--vary", "k=1e6"] if command == "sweep" else []
+        others.append(call(command, deck, *vary, "-o", result, "--overwrite"))
+        return {"a": 1.0}
+
+    swept = fecm.sweep(deck, {"k": [1e6]}, measure=write_meanwhile, output=result, overwrite=True)
+    (refused,) = others
+    assert_unusable(refused)
+    assert "s.h5 is being written by another process" in refused.stderr
+    assert fecm.load_sweep(result)["a"].tolist() == swept["a"].tolist() == [1.0]
 
 
 def workers_of(pid: int) -> list[int]:

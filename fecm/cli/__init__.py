@@ -8,6 +8,7 @@ imported when the command is called.
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import warnings
 from collections.abc import Sequence
@@ -147,6 +148,7 @@ def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoR
     isolation.enabled = arguments is None
     warnings.showwarning = _show_warning
     os.environ["MPLBACKEND"] = "agg"  # pictures are files, whatever a notebook's environment says
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # such as a HOME without its cache
     status = _status(arguments, prog_name)
     if (error := streams.output_error()) is not None and status not in SIGNALLED:
         status = UNUSABLE
@@ -213,6 +215,8 @@ def _message(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:
         name = error.filename2 or error.filename  # the target of a rename
         named = name and not isinstance(name, int)
+        if isinstance(error, FileNotFoundError) and not name:  # of os.getcwd
+            return "the current folder does not exist any more; change to another one"
         return printable(f"{name}: {error.strerror}" if named else error.strerror)
     if isinstance(error, FecmError):
         return printable(with_options(str(error)))

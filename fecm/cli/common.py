@@ -28,6 +28,7 @@ NAMED_IN_MESSAGES = (
     "build|cases|columns|correlation|deck|design|exceed|full|measure|model|modes|random|refine|"
     "samples|scheduler|seed|sensitivity|units|until|vary"
 )
+LONGEST = 1000  # characters of a line of standard error
 DASH = Path("-")  # standard input or output
 
 
@@ -44,10 +45,23 @@ class CheckFailedError(FecmError):
 def echo(text: object = "", *, err: bool = False) -> None:
     """Print lines to the terminal, with control characters escaped.
 
-    An error of standard output does not end the command; the exit status reports it.
+    A line of standard error that is longer than LONGEST loses its middle. An error of standard
+    output does not end the command; the exit status reports it.
     """
+    lines = [printable(line) for line in str(text).split("\n")]
     with contextlib.suppress(OSError):
-        click.echo("\n".join(map(printable, str(text).split("\n"))), err=err)
+        click.echo("\n".join(map(_shortened, lines) if err else lines), err=err)
+
+
+def _shortened(line: str) -> str:
+    """Return a line without its middle if it is too long; a message ends with the remedy."""
+    half = LONGEST // 2
+    return line if len(line) <= LONGEST else f"{line[:half]} … {line[-half:]}"
+
+
+def echo_path(path: object, label: str = "") -> None:
+    """Print the name of a file in one line, after a label."""
+    echo(label + printable(str(path)))
 
 
 def echo_json(value: object) -> None:

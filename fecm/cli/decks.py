@@ -18,6 +18,7 @@ from click import option
 
 from fecm._errors import FecmError
 from fecm._files import check_outputs
+from fecm._text import printable
 from fecm._version import __version__
 from fecm.cli.common import (
     DASH,
@@ -176,7 +177,7 @@ def _print(prepared: LoadedDeck, form: Format, *, brief: bool, passes: bool) -> 
         if passes:
             counts = Counter(finding.severity for finding in prepared.findings)
             counted = [f"{n} {word}{'s' * (n != 1)}" for word, n in counts.items()]
-            echo(f"{prepared.source}: {', '.join(counted) or 'no findings'}")
+            echo(f"{printable(prepared.source)}: {', '.join(counted) or 'no findings'}")
 
 
 def _compare_meshes(prepared: LoadedDeck, mode: str, form: Format) -> None:

@@ -8,7 +8,7 @@ import click
 
 from fecm import examples
 from fecm._files import check_outputs
-from fecm.cli.common import DASH, echo, write_text
+from fecm.cli.common import DASH, echo, echo_path, write_text
 from fecm.cli.options import FILE_PATH, Parsed, typical
 
 
@@ -46,4 +46,4 @@ def example_command(name: str | None, output: Path | None, overwrite: bool) -> N
         check_outputs([target], overwrite, [source])
     write_text(target, source.read_text(encoding="utf-8"), overwrite=overwrite)
     if target != DASH:
-        echo(target)
+        echo_path(target)

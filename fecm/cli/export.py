@@ -8,7 +8,7 @@ import click
 
 from fecm._files import check_outputs
 from fecm._text import Decimal
-from fecm.cli.common import DASH, RefusedError, echo, note
+from fecm.cli.common import DASH, RefusedError, echo_path, note
 from fecm.cli.isolation import reads
 from fecm.cli.options import DECK_PATH, FILE_PATH, NAMED_PATH, typical
 from fecm.cli.outputs import DECIMAL_OPTION, write_lines
@@ -48,7 +48,7 @@ def tapes_command(result: Path, directory: Path, overwrite: bool) -> None:
     elif directory.exists():
         raise RefusedError(f"{directory} is not a folder")
     for path in write_tapes(loaded, directory, overwrite=overwrite):
-        echo(path)
+        echo_path(path)
 
 
 @click.command(
@@ -123,7 +123,7 @@ def export_command(
     except ExportError as error:
         raise RefusedError(f"{result}: {error}") from None
     if path != DASH:
-        echo(path)
+        echo_path(path)
 
 
 def _write_sweep(

@@ -29,7 +29,7 @@ from fecm.authoring.parameters import ObjectError
 from fecm.authoring.plate import CUSTOM, FIXTURES, Plate, Support
 from fecm.authoring.zones import Zone
 from fecm.cli import new_values
-from fecm.cli.common import DASH, RefusedError, echo, note, write_text
+from fecm.cli.common import DASH, RefusedError, echo, echo_path, note, write_text
 from fecm.cli.isolation import reads
 from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options, unique
 from fecm.cli.options import (
@@ -411,7 +411,7 @@ def new_command(options: NewOptions) -> None:
         echo(finding.render(str(output) if to_file else "the new deck"), err=True)
     write_text(output, text, overwrite=overwrite)
     if to_file:
-        echo(output)
+        echo_path(output)
 
 
 def _author(options: NewOptions, on_command_line: Collection[str]) -> Authored:

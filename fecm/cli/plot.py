@@ -14,7 +14,7 @@ from click import option
 from fecm._errors import FecmWarning
 from fecm._files import check_outputs
 from fecm._text import printable
-from fecm.cli.common import CheckFailedError, RefusedError, echo, note, progress
+from fecm.cli.common import CheckFailedError, RefusedError, echo_path, note, progress
 from fecm.cli.isolation import reads
 from fecm.cli.options import (
     COLUMNS_OPTION,
@@ -221,7 +221,7 @@ def plot_command(
     for kind, picture in pictures.items():
         with progress(kind, len(picture.frames)) as advance:
             save_picture(picture, paths[kind], overwrite=overwrite, advance=advance)
-        echo(paths[kind])
+        echo_path(paths[kind])
     if lacking:
         raise CheckFailedError(
             "; ".join(f"{kind} is not drawn: {error}" for kind, error in lacking.items())

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from click import option
 
-from fecm.cli.common import RefusedError, echo
+from fecm.cli.common import RefusedError, echo_path
 from fecm.cli.isolation import reads
 from fecm.cli.options import NAMED_PATH, typical
 from fecm.cli.plot import named, run_or_sweep
@@ -52,6 +52,6 @@ def report_command(
     }
     digests = {name: digest(place) for name, place in paths.items()}
     write_report(loaded, path, digests, overwrite=overwrite)
-    echo(path)
+    echo_path(path)
     if opens and click.launch(str(path)):
         raise RefusedError(f"{path} is written, but no browser could be started")

@@ -15,6 +15,7 @@ from fecm.cli.common import (
     RefusedError,
     echo,
     echo_json,
+    echo_path,
     watching,
 )
 from fecm.cli.decks import refusing_errors
@@ -138,9 +139,9 @@ def _run_and_print(job: ProblemRun, form: Format) -> list[tuple[str, float]]:
     echo(title or "(no title)")
     for line in (*about["summary"], *larger_steps(job.problem)):
         echo(f"  {line}")
-    echo(f"  result            {path}")
+    echo_path(path, "  result            ")
     if job.printed is not None:
-        echo(f"  printed           {job.printed}")
+        echo_path(job.printed, "  printed           ")
     return exposures
 
 

@@ -15,6 +15,7 @@ from fecm.cli.common import (
     FAILED,
     TerminalWatch,
     echo,
+    echo_path,
     every_minute,
     note,
     watching,
@@ -177,7 +178,7 @@ def _print(result: SweepResult, job: Sweep) -> None:
         echo(f"  {line}")
     for line in () if result.random is None else tables(result.random, result.unit):
         echo(f"  {line}".rstrip())
-    echo(f"  result            {job.path}")
+    echo_path(job.path, "  result            ")
 
 
 class _EndingWatch(TerminalWatch):
@@ -205,5 +206,5 @@ def _run_in_full(case: int, run: ProblemRun) -> None:
     except (KeyboardInterrupt, SystemExit):
         note(f"case {case} was not run in full: a signal stopped the program")
         raise
-    echo(f"  case {case:<12} {run.path}")
+    echo_path(run.path, f"  case {case:<12} ")
     note(*(f"case {case}: {text}" for text in notes))

@@ -245,7 +245,14 @@ def result_writing(
 
     Raises ResultWriteError if the file can't be written; an existing file then stays unchanged.
     """
-    with new_hdf5(path, overwrite=overwrite) as (file, guarded):
+    with beside(path, overwrite=overwrite) as partial, result_at(partial, path, form) as sink:
+        yield sink
+
+
+@contextlib.contextmanager
+def result_at(partial: Path, path: Path, form: Form) -> Iterator[FileSink]:
+    """Open a result at its partial file, from :func:`beside`; see :func:`result_writing`."""
+    with _hdf5_at(partial, path) as (file, guarded):
         sink = FileSink(file, guarded, form)
         yield sink
         sink.label_axes()
@@ -268,7 +275,14 @@ def save_result(stored: Stored, path: Path, *, overwrite: bool) -> None:
 @contextlib.contextmanager
 def new_hdf5(path: Path, *, overwrite: bool = True) -> Iterator[tuple[h5py.File, _Guarded]]:
     """Open an HDF5 file for writing; see :func:`result_writing`."""
-    with beside(path, overwrite=overwrite) as partial, _Guarded(partial, "w+") as guarded:
+    with beside(path, overwrite=overwrite) as partial, _hdf5_at(partial, path) as opened:
+        yield opened
+
+
+@contextlib.contextmanager
+def _hdf5_at(partial: Path, path: Path) -> Iterator[tuple[h5py.File, _Guarded]]:
+    """Open an HDF5 file for writing at its partial file; `path` is its final name."""
+    with _Guarded(partial, "w+") as guarded:
         with h5py.File(guarded, "w") as file:
             try:
                 yield file, guarded

@@ -21,7 +21,6 @@ from fecm.sweeps.outcome import Status as Status
 from fecm.sweeps.partial_results import DamagedPartError as DamagedPartError
 from fecm.sweeps.partial_results import OtherSweepError as OtherSweepError
 from fecm.sweeps.partial_results import PartialResults as PartialResults
-from fecm.sweeps.partial_results import exclusive_result as exclusive_result
 from fecm.sweeps.random import DESIGNS as DESIGNS
 from fecm.sweeps.random import Design as Design
 from fecm.sweeps.random import DesignKind as DesignKind

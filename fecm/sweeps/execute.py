@@ -16,7 +16,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent import futures
-from contextlib import nullcontext, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
 from multiprocessing import resource_tracker
 from multiprocessing.synchronize import Event
@@ -37,6 +37,7 @@ from fecm.sweeps.result import SweepResult, sweep_result
 from fecm.sweeps.task import WORTH_WORKERS, Plan, Task, run_task
 
 Done = Callable[[Task, Outcome], None]
+Submit = Callable[[Callable[[Task], Outcome], Task], futures.Future[Outcome]]
 Idle = Callable[[], None]  # called regularly while workers run, to handle signals
 DEATHS = 3  # of workers without a finished task, after which the remaining tasks count as lost
 LOOK = 0.5  # polling interval in seconds
@@ -47,6 +48,7 @@ UNGUARDED = (
     "no worker process could start: each imports the script that is running; call fecm there under "
     f"{GUARD}"
 )
+ENDING = {n for n in signal.Signals if n.name in ("SIGINT", "SIGTERM", "SIGHUP")}
 MOST_ADDRESS = 100_000  # bytes of a file with the scheduler's address
 
 
@@ -62,20 +64,40 @@ def attempt(task: Task) -> Outcome:
         return Outcome.failed(dict.fromkeys(task.numbers, f"{type(error).__name__}: {error}"))
 
 
-def _begin(started: Event, parent: int) -> None:
-    """Report that this worker process has started, and end it soon after its parent process."""
+def _begin(started: Event, ended: Event, parent: int) -> None:
+    """Report that this worker process has started; end it soon after its parent, or at `ended`."""
     started.set()
 
     def watch() -> None:
-        while os.getppid() == parent:
+        while os.getppid() == parent and not ended.is_set():
             time.sleep(LOOK)
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # an interrupt has no traceback
+    if hasattr(signal, "pthread_sigmask"):  # not on Windows
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
+
+
+@contextmanager
+def _signals_blocked() -> Iterator[None]:
+    """Block the signals that end a program; a process that is started inherits this.
+
+    A terminal sends its signals to all processes. Python would print a traceback for a signal that
+    comes while it starts.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _run_on(
-    executor: futures.Executor, tasks: Iterable[Task], idle: Idle
+    submit: Submit, tasks: Iterable[Task], idle: Idle
 ) -> Iterator[tuple[Task, futures.Future[Outcome]]]:
     """Yield tasks and futures as an executor finishes them.
 
@@ -85,7 +107,7 @@ def _run_on(
     try:
         for task in tasks:
             try:
-                running[executor.submit(attempt, task)] = task
+                running[submit(attempt, task)] = task
             except futures.BrokenExecutor:
                 raise
             except (RuntimeError, TypeError, pickle.PicklingError) as error:
@@ -140,13 +162,9 @@ def start_resource_tracker() -> None:
     A closing terminal sends SIGHUP to all processes. Without its first tracker, multiprocessing
     starts another one, which prints a traceback for each semaphore that it does not know.
     """
-    if not hasattr(signal, "SIGHUP"):  # Windows, which has no tracker
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})  # which a child inherits
-    try:
-        resource_tracker.ensure_running()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    if hasattr(signal, "SIGHUP"):  # Windows has no tracker
+        with _signals_blocked():
+            resource_tracker.ensure_running()
 
 
 def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> None:
@@ -161,21 +179,24 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
     while remaining and deaths < DEATHS:
         before = len(remaining)
         context = multiprocessing.get_context("spawn")
-        started = context.Event()
-        pool = futures.ProcessPoolExecutor(count, context, _begin, (started, os.getpid()))
+        started, ended = context.Event(), context.Event()
+        pool = futures.ProcessPoolExecutor(count, context, _begin, (started, ended, os.getpid()))
+        submit = _signals_blocked()(pool.submit)  # the first task starts the processes
         try:
-            for task, future in _run_on(pool, list(remaining.values()), idle):
+            for task, future in _run_on(submit, list(remaining.values()), idle):
                 done(task, future.result())
                 del remaining[task.number]
         except SchedulerError:  # Python starts no process while it imports the script
             raise SchedulerError(UNGUARDED) from None
         except futures.BrokenExecutor:
+            idle()  # a signal to all processes ends the sweep
             is_guarded = is_guarded or started.is_set()
             if not is_guarded:
                 raise SchedulerError(UNGUARDED) from None
             deaths = 0 if len(remaining) < before else deaths + 1
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+        finally:  # workers that are starting need the semaphores
+            ended.set()
+            pool.shutdown(cancel_futures=True)
     for task in remaining.values():
         done(task, Outcome.failed(dict.fromkeys(task.numbers, LOST)))
 
@@ -239,7 +260,7 @@ def on_executor(tasks: Sequence[Task], executor: futures.Executor, done: Done, i
     """
     broken: futures.BrokenExecutor | None = None
     try:
-        for task, future in _run_on(executor, tasks, idle):
+        for task, future in _run_on(executor.submit, tasks, idle):
             try:
                 outcome = future.result()
             except futures.BrokenExecutor as error:  # tasks that are finished still follow

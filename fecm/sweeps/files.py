@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fecm._errors import ResultFileError
+from fecm._files import beside
 from fecm._text import Decimal, csv_lines
 from fecm._typing import Floats
 from fecm.authoring.cases import CONVERTED, MEASURED
@@ -169,19 +170,27 @@ def _exceedance(contents: FileContents, names: Iterable[str], first: tuple[int, 
 FORCE = "history/force"
 
 
-def save_sweep(
-    result: StoredSweep, path: Path, *, overwrite: bool = True, forces: Iterable[Forces] = ()
-) -> None:
+def save_sweep(result: StoredSweep, path: Path, *, overwrite: bool = True) -> None:
     """Write the result of a sweep.
 
-    `forces` yields the forces that the result does not hold, for some cases at a time. Raises
-    ResultWriteError if the file can't be written; an existing file then stays unchanged.
+    Raises ResultWriteError if the file can't be written; an existing file then stays unchanged.
     """
-    from fecm.results.hdf5_writer import result_writing  # h5py takes 60 ms to import
+    with beside(path, overwrite=overwrite) as partial:
+        write_sweep(result, partial, path)
+
+
+def write_sweep(
+    result: StoredSweep, partial: Path, path: Path, forces: Iterable[Forces] = ()
+) -> None:
+    """Write the result of a sweep to the partial file of its final name, from :func:`beside`.
+
+    `forces` yields the forces that the result does not hold, for some cases at a time.
+    """
+    from fecm.results.hdf5_writer import result_at  # h5py takes 60 ms to import
 
     if result.force is not None:
         forces = [(range(len(result)), result.force)]
-    with result_writing(path, schema.Form.SWEEP, overwrite=overwrite) as sink:
+    with result_at(partial, path, schema.Form.SWEEP) as sink:
         units = {f"unit_{name}": unit for name, unit in result.units.items()}
         law = {"law": result.law} if result.law else {}
         sink.attributes("", schema.heading(schema.Form.SWEEP, result.title) | units | law)

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecm._files import check_outputs
+from fecm._files import beside, check_outputs
 from fecm._options import documented, option, with_parameters_of
 from fecm._table import Row, html_summary
 from fecm._watch import LOGGER, CallerWatch, Progress, Watch
@@ -46,10 +46,10 @@ from fecm.sweeps.convergence import refined_cases
 from fecm.sweeps.distributions import FORMS, OwnDistribution, distribution_of
 from fecm.sweeps.exclusions import check_options
 from fecm.sweeps.execute import LOST, Done, Means, SchedulerError, carry_out_plan
-from fecm.sweeps.files import save_sweep
+from fecm.sweeps.files import write_sweep
 from fecm.sweeps.in_full import built, case_deck
 from fecm.sweeps.outcome import Outcome, Status
-from fecm.sweeps.partial_results import PartialResults, exclusive_result
+from fecm.sweeps.partial_results import PartialResults
 from fecm.sweeps.plan import plan
 from fecm.sweeps.price import output_bytes
 from fecm.sweeps.random import (
@@ -474,16 +474,22 @@ class Sweep:
         streams = self._streams and not keeps_forces
         check_sweep_memory(self.problem, self.plan, self._means.here, streamed=streams)
         LOGGER.info("%s: %d cases", self.title, len(self.all_cases))
+        parts = None
         with contextlib.ExitStack() as stack:
-            parts = None
+            partial = None
+            if self.path is not None:  # no other process writes the same output meanwhile
+                partial = stack.enter_context(beside(self.path, overwrite=self.overwrite))
             if self._streams and self.path is not None:
-                stack.enter_context(exclusive_result(self.path))
                 parts = PartialResults(
                     self.path, self.plan.fingerprint(), restart=self.overwrite, resume=self.resume
                 )
             result = self._computed(parts, watch, keeps_forces=keeps_forces or parts is None)
             result.index = index_of(self.cases)
-            self._save(result, parts, watch)
+            if partial is not None and self.path is not None:
+                stored = parts if parts and self.history and result.force is None else None
+                write_sweep(result, partial, self.path, () if stored is None else stored.forces())
+        if parts is not None:
+            _clear(parts, result, watch)
         return result
 
     def _computed(
@@ -512,20 +518,6 @@ class Sweep:
             if parts is not None and not parts.has_tasks:
                 parts.clear()
             raise
-
-    def _save(self, result: SweepResult, parts: PartialResults | None, watch: Watch) -> None:
-        """Write the result, and delete partial results if no case is lost."""
-        if self.path is None:
-            return
-        stored = parts if parts is not None and self.history and result.force is None else None
-        forces = () if stored is None else stored.forces()
-        save_sweep(result, self.path, overwrite=self.overwrite, forces=forces)
-        lost = sum(status.startswith(LOST) for status in result["status"].tolist())
-        if lost and parts is not None:
-            text = f"{lost} cases were lost with their workers"
-            watch.note(f"{text}; overwrite=True runs them again")
-        elif parts is not None:
-            parts.clear()
 
     def full_runs(self) -> dict[int, ProblemRun]:
         """Return the runs of the cases of `full`, with all rows that their deck stores, by number.
@@ -558,6 +550,16 @@ def _loaded(deck: AnyDeck) -> LoadedDeck:
     loaded.refuse_errors(force=True)
     sole(loaded.problems, loaded.source)
     return loaded
+
+
+def _clear(parts: PartialResults, result: SweepResult, watch: Watch) -> None:
+    """Delete the partial results of a sweep that is written, unless cases are lost."""
+    lost = sum(status.startswith(LOST) for status in result["status"].tolist())
+    if lost:
+        text = f"{lost} cases were lost with their workers"
+        watch.note(f"{text}; overwrite=True runs them again")
+    else:
+        parts.clear()
 
 
 def _first_built(build: BuildFunction | None, cases: Sequence[Case]) -> LoadedDeck:

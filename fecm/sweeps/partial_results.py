@@ -12,14 +12,13 @@ import io
 import json
 import shutil
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager
 from pathlib import Path
 from zipfile import ZIP_STORED
 
 import numpy as np
 
 from fecm._errors import FecmError
-from fecm._files import OutputError, beside, held, make_folder, open_ordinary, packed
+from fecm._files import OutputError, beside, make_folder, open_ordinary, packed
 from fecm._typing import Array
 from fecm.results.metrics import COLUMNS, GAGE, SUMMARY
 from fecm.sweeps.outcome import About, Forces, Outcome
@@ -44,14 +43,6 @@ class DamagedPartError(FecmError, ValueError):
 def parts_of(result: Path) -> Path:
     """Return the folder of the partial results of a sweep."""
     return result.with_name(f".{result.name}.parts")
-
-
-def exclusive_result(result: Path) -> AbstractContextManager[None]:
-    """Keep other processes from this result.
-
-    Raises OutputError if another process computes it.
-    """
-    return held(parts_of(result), f"{result} is being computed by another process")
 
 
 class PartialResults:
