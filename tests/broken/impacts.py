@@ -47,14 +47,14 @@ BREAKS: Breaks = {
     ),
     "a quarter taken as the whole plate": (
         value(metrics, "SHARED", ()),
-        {"supported-plate": ("largest force", "its impulse")},
+        {"supported-plate": ("largest force",)},
     ),
     "a peak passes at 0.8 of the force": (
         value(end, "FALLEN", 0.8),
-        {"end-of-contact": ("plate as fast", "share that decides a deflection which falls")},
+        {"end-of-contact": ("plate half as fast", "share that decides a deflection which falls")},
     ),
     "a projectile leaves clearly at half of the plate's velocity": (
-        value(end, "CLEAR", 0.5), {"end-of-contact": ("plate three times",)},
+        value(end, "CLEAR", 0.5), {"end-of-contact": ("plate twice as fast",)},
     ),
     "a value that is largest at the last step is decided": (
         instead(end, "decided", lambda right, most, last, state: right(most, last - 1.0, state)),
