@@ -216,3 +216,9 @@ def test_no_contact_is_estimated_on_a_fabric() -> None:
     assert_unusable(made)
     assert "the ply is a fabric" in made.stderr
     assert "`fecm indent hertz --et E3`" in made.stderr
+
+
+def test_a_mesh_of_a_window_that_is_refined_to_a_patch_is_told() -> None:
+    window = ("--fixture", "D7136", *PLATE[:4], "--material", "IM7/8552", "--patch", "disc:2")
+    assert "20x14 elements instead of 8x6: their sides at" in new(*window, *QUICK).stderr
+    assert "elements instead of" not in new(*window, *QUICK[2:]).stderr

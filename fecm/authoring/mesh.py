@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, Self
 
 from fecm.authoring.laminate import DeckPlies
 from fecm.authoring.parameters import ObjectError, is_finite, number_pair
-from fecm.authoring.plate import MOST, Plate
+from fecm.authoring.plate import MOST, WINDOW_MESH, Plate
 from fecm.deck import grid as grids
 from fecm.deck.grid import ElementGrid, GridSection, held_in_plane
 from fecm.deck.model import Boundary, Curvature, Patch
@@ -86,13 +86,20 @@ def place_impact(
 
 
 def _doubts_of_refinement(plate: Plate, mesh: AnyMesh, patch: Patch | None) -> list[str]:
-    """Return a doubt if refinement changes the numbers of elements of a rectangle."""
-    if not isinstance(mesh, ElementGrid) or plate.mesh is None or plate.fixture is not None:
+    """Return a doubt if refinement changes the numbers of elements of a rectangle or window.
+
+    The default mesh of a window is refined without a word.
+    """
+    if not isinstance(mesh, ElementGrid) or plate.mesh is None:
         return []
     if patch is None or patch.radius is None:
         return []
-    counts = mesh.across // 2, mesh.up // 2
-    if counts == plate.mesh:
+    beside = 1 if plate.fixture else 0  # sections of the frame at each end
+    counts = tuple(
+        sum(section.elements for section in sections[beside : len(sections) - beside])
+        for sections in (mesh.columns, mesh.rows)
+    )
+    if counts == plate.mesh or (plate.fixture and plate.mesh == WINDOW_MESH):
         return []
     refined, requested = (f"{nx}x{ny}" for nx, ny in (counts, plate.mesh))
     return [

@@ -52,7 +52,7 @@ GROUPED = {
         "run": LazyCommand("fecm.cli.run", "Run every problem in DECK and write its result."),
         "info": LazyCommand("fecm.cli.info", "Describe the contents of RESULT."),
         "plot": LazyCommand("fecm.cli.plot", "Draw the report's figures, or the map of a sweep."),
-        "report": LazyCommand("fecm.cli.report", "Write an HTML page about results."),
+        "report": LazyCommand("fecm.cli.report", "Write a report page (HTML) about results."),
         "export": LazyCommand("fecm.cli.export", "Write RESULT for ParaView or a spreadsheet."),
         "tapes": LazyCommand("fecm.cli.export", "Write tape3, tape8 and tape9 as text."),
     },

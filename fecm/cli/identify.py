@@ -67,7 +67,7 @@ from fecm.studies.rod_test.filters import filter_of
     "page",
     type=NAMED_PATH,
     metavar="FILE.html",
-    help="Also write an HTML page about the fit.",
+    help="Also write a report page (HTML) about the fit.",
 )
 @option("--overwrite", is_flag=True, help="Replace existing files.")
 @FORMAT_OPTION

@@ -29,15 +29,15 @@ from fecm.results.schema import Form
     "--output",
     type=NAMED_PATH,
     metavar="FILE.html",
-    help="Page to write.  [default: RESULT.html in this folder]",
+    help="Report page to write.  [default: RESULT.html in this folder]",
 )
 @option("--open", "opens", is_flag=True, help="Open the page in the browser.")
-@option("--overwrite", is_flag=True, help="Replace an existing page.")
+@option("--overwrite", is_flag=True, help="Replace an existing report page.")
 @reads("results")
 def report_command(
     results: tuple[Path, ...], output: Path | None, opens: bool, overwrite: bool
 ) -> None:
-    """Write one HTML page about RESULT: of a run, of a sweep, or of several runs side by side.
+    """Write a report page about RESULT: of a run, of a sweep, or of several runs side by side.
 
     The page is self-contained: verdict, range of the model, numbers, pictures, model, checksums
     and the deck.  It needs no network and no scripts, and prints on A4.

@@ -150,7 +150,7 @@ def worst(judgements: Iterable[Judgement]) -> TrustLevel:
     return next((level for level in order if level in levels), TrustLevel.WITHIN)
 
 
-MISSING = "reports need Jinja2: pip install 'fecm[report]'"
+MISSING = "report pages need Jinja2: pip install 'fecm[report]'"
 SUFFIXES = (".html", ".htm")
 
 
@@ -218,5 +218,5 @@ def check_page(path: Path, overwrite: bool, inputs: Iterable[Path] = ()) -> None
     require_jinja2()
     require_matplotlib()
     if path.suffix.lower() not in SUFFIXES:
-        raise ReportError(f"{path}: a report is written as {SUFFIXES[0]}")
+        raise ReportError(f"{path}: a report page is written as {SUFFIXES[0]}")
     check_outputs([path], overwrite, inputs)
