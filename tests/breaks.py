@@ -6,6 +6,7 @@ import inspect
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,7 @@ def in_numpy(broken: Break) -> Break:
     """Run without the compiled kernels: they have a copy of their own of what is broken."""
 
     def apply(monkeypatch: pytest.MonkeyPatch) -> None:
+        import_module("fecm.mechanics.kernels.failure")  # it would keep that there is no library
         monkeypatch.setattr("fecm.mechanics.kernels.LIBRARY", None)
         broken(monkeypatch)
 
