@@ -13,7 +13,7 @@ import pytest
 
 import fecm
 from fecm.authoring import apply_case
-from fecm.deck import Boundary, Finding, Nonlinear, Preload, Shear
+from fecm.deck import Boundary, Curvature, Delamination, Finding, Nonlinear, Preload, Shear
 from fecm.mechanics import critical_time_step
 from fecm.problem import build_plate, load_deck, sole_problem
 from fecm.problem.generate import generate
@@ -217,8 +217,37 @@ def test_a_preload_takes_units_and_a_missing_shear_is_zero() -> None:
 
 
 @pytest.mark.parametrize(
+    ("dt", "giic", "radius"),
+    [(2e-7, 0.8, 1000.0), ("0.2us", "800J/m^2", "1m"), ("2e-7", "0.8N/mm", "1000")],
+)
+def test_step_toughness_and_radii_take_units(
+    dt: float | str, giic: float | str, radius: float | str
+) -> None:
+    made = fecm.impact(
+        fecm.Plate.rectangle((100, 80), (4, 4), support="simple"),
+        fecm.Laminate("[0/90]2s", "IM7/8552", 0.184),
+        fecm.RigidMass(1e-3),
+        fecm.Contact(1e5, 0.0, 0.0, 1.5),
+        velocity=1000.0,
+        duration=1e-5,
+        units="mm-N-s",
+        dt=dt,
+        giic=giic,
+        radius_x=radius,
+        radius_y=radius,
+    )
+    assert made.require(Delamination).toughness == pytest.approx(0.8, rel=1e-8)
+    curvature = made.require(Curvature)
+    assert (curvature.radius_x, curvature.radius_y) == (1000.0, 1000.0)
+    assert next(m.value for m in made.macros if m.word == "DT") == 2e-7
+
+
+@pytest.mark.parametrize(
     ("options", "said"),
     [
+        (["--dt", "4mm"], "--dt is '4mm', not a number or one with a unit, as in 4ms"),
+        (["--giic", "3J"], "as in 50N/mm"),
+        (["--radius-x", "1kg"], "--radius-x is '1kg'"),
         (["--nonlinear", "--shear", "full"], "--kinematics von-karman needs assumed shear strains"),
         (["--preload", "5"], "NX,NY[,NXY]"),
         (["--preload", "5J,3"], "as in 50N/mm"),

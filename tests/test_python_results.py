@@ -264,6 +264,8 @@ def test_ranges_and_units_are_read_alike_in_python_and_on_the_command_line() -> 
     assert text["mass"].tolist() == mapping["mass"].tolist() == [1e-3, 2e-3] * 3
     energies = fecm.Sweep(METRIC, {"energy": "1J:5J:5"}).all_cases
     assert [case["energy"] for case in energies] == [1000.0, 2000.0, 3000.0, 4000.0, 5000.0]
+    mixed = fecm.Sweep(METRIC, {"energy": ["1J:5J:3", "8J", 9.0]}).all_cases
+    assert [case["energy"] for case in mixed] == [1000.0, 3000.0, 5000.0, 8000.0, 9.0]
     layups = fecm.Sweep(METRIC, {"layup": "[0/90],[90/0]"}).all_cases
     assert [case["layup"] for case in layups] == ["[0/90]", "[90/0]"]
     dense = fecm.Sweep(METRIC, {"density": ["1.6g/cm^3"], "k": ["2e4N/mm^1.5"]}).all_cases

@@ -371,6 +371,13 @@ def grid_cases(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
     return [dict(zip(names, values, strict=True)) for values in combinations]
 
 
+def _spread(name: str, value: Any, system: str | None) -> list[Any]:
+    """Return the values of the text of a range, as in ``1J:5J:5``; any other value alone."""
+    if isinstance(value, str) and ":" in value:
+        return list(parse_vary(f"{name}={value}", system)[1])
+    return [value]
+
+
 def combined(vary: object, *, free: bool = False, system: str | None = None) -> list[Case]:
     """Return every combination of the values in the lists of `vary`.
 
@@ -388,6 +395,8 @@ def combined(vary: object, *, free: bool = False, system: str | None = None) -> 
         values: list[Any] | None = None
         with suppress(TypeError):
             values = None if isinstance(choices, str | bytes) else list(choices)
+        if values is not None and not free:  # ranges in the list, as in ["1J:5J:5"]
+            values = [one for value in values for one in _spread(name, value, system)]
         if values is None:
             raise CasesError(
                 f'vary: {name} is one value; write a list: {{"{name}": [{choices!r}]}}'

@@ -62,7 +62,7 @@ from fecm.deck.findings import DeckError
 from fecm.deck.grid import IN_PLANE
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Control, Gage
-from fecm.deck.units import MODULUS, quantity, unit_of, units_of
+from fecm.deck.units import MODULUS, TOUGHNESS, quantity, unit_of, units_of
 from fecm.mechanics.laminate import are_cores
 from fecm.mechanics.points import RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import DeckProjectile, RigidMass
@@ -145,12 +145,12 @@ class Request(NamedTuple):
     numerics: Numerics
     units: str | None = None
     in_plane: InPlane | None = None
-    radius_x: float | None = None
-    radius_y: float | None = None
+    radius_x: float | str | None = None
+    radius_y: float | str | None = None
     kinematics: Kinematics = AUTO_KINEMATICS
     preload: Sequence[float | str] | None = None
     gages: Iterable[GagePlace] = ()
-    giic: float | None = None
+    giic: float | str | None = None
     cure: float | str | None = None
     title: str | None = None  # None for the default title
     zones: Sequence[Zone] = ()
@@ -179,11 +179,12 @@ class Request(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Velocity, energy and duration as numbers, in the units of the deck."""
+    """Velocity, energy, duration and time step as numbers, in the units of the deck."""
 
     velocity: float | None
     energy: float | None
     duration: float | None
+    dt: float | None
 
 
 class Authored(NamedTuple):
@@ -205,7 +206,7 @@ def impact(
     energy: float | str | None = None,
     at: tuple[float, float] | None = None,
     duration: float | str | None = None,
-    dt: float | None = None,
+    dt: float | str | None = None,
     every: int | None = None,
     plies: int | bool | tuple[int, int] | None = None,
     failure: int | bool | None = None,
@@ -214,14 +215,14 @@ def impact(
     shear: Quadrature = "mitc",
     shear_factor: float | Literal["equi"] | None = None,
     in_plane: InPlane | None = None,
-    radius_x: float | None = None,
-    radius_y: float | None = None,
+    radius_x: float | str | None = None,
+    radius_y: float | str | None = None,
     kinematics: Kinematics | None = None,
     nonlinear: bool | None = None,
     preload: Sequence[float | str] | None = None,
     gages: Iterable[tuple[float, float, float, float]] = (),
     damage: bool = False,
-    giic: float | None = None,
+    giic: float | str | None = None,
     cure: float | str | None = None,
     title: str | None = None,
     zones: Sequence[tuple[str | Sequence[float], Layup | Laminate]] = (),
@@ -253,8 +254,8 @@ def impact(
         is over (``OVER``), after at most 4 times the expected time: 1.25 half periods of the
         projectile on the plate, or 1.1 times the duration of the contact with the indentation if
         that is longer.
-    dt : float, optional
-        Time step; 0.9 of the critical time step by default.
+    dt : float or str, optional
+        Time step, also with a unit, ``"0.5us"``; 0.9 of the critical time step by default.
     every : int, optional
         Steps between stored rows; about 200 rows by default.
     plies : int or bool or tuple of int, optional
@@ -285,9 +286,9 @@ def impact(
         ``"tangential"`` (held along the edge only). The default is ``"free"`` on fixtures,
         ``"tangential"`` on the simple edges of a curved panel, and ``"held"`` elsewhere. Pinned
         edges always hold both.
-    radius_x, radius_y : float, optional
-        Radii of a shallow curved panel (length). They are positive if the struck face is hollow.
-        Without them the plate is flat.
+    radius_x, radius_y : float or str, optional
+        Radii of a shallow curved panel (length); a text may have a unit, ``"1m"``. They are
+        positive if the struck face is hollow. Without them the plate is flat.
     kinematics : str, optional
         ``"von-karman"`` for a plate that stretches as it bends; `shear` must be ``"mitc"``.
         ``"linear"`` for a plate that does not. ``"auto"``, the default, chooses von Kármán if the
@@ -302,9 +303,9 @@ def impact(
     damage : bool
         Add the known strengths and toughness of a named ply, and store the data for the pictures of
         failure and of stresses through the thickness.
-    giic : float, optional
-        Toughness G_IIc for the delamination threshold, force/length; with `damage` the default is
-        the toughness of a named ply.
+    giic : float or str, optional
+        Toughness G_IIc for the delamination threshold, force/length; a text may have a unit,
+        ``"800J/m^2"``. With `damage` the default is the toughness of a named ply.
     cure : float or str, optional
         Residual stresses of the cure; they need a named ply with coefficients of expansion. The
         value is the temperature of use minus the stress-free temperature, K, or both temperatures,
@@ -382,6 +383,8 @@ def author(request: Request) -> Authored:
     laminates = laminates_of(request.laminate, request.zones)
     plies, in_zones = deck_plies(request.laminate, laminates, STANDARD if test else units, notes)
     strike, motion = request.strike, _parse_motion(request, plies)
+    giic = in_units("giic", request.giic, TOUGHNESS, plies.system)
+    check_positive(giic=giic)
     if fixture is not None and test is not None:
         strike, motion = _apply_standard(test, strike, motion, plies.thickness)
         if not test.allows(plies.thickness):
@@ -413,9 +416,9 @@ def author(request: Request) -> Authored:
     if isinstance(strike.contact, Sphere):
         doubts += doubts_of_sphere(strike.contact, plies.system, test)
     if request.numerics.damage:
-        damage = damage_segments(plies, request.giic, notes)
+        damage = damage_segments(plies, giic, notes)
     else:
-        damage = toughness_segment(request.giic)
+        damage = toughness_segment(giic)
     if is_sandwich(plies, struck) and any(isinstance(s, model.Delamination) for s in damage):
         damage = [s for s in damage if not isinstance(s, model.Delamination)]
         notes.append(
@@ -450,7 +453,7 @@ def author(request: Request) -> Authored:
         request.kinematics,
         lambda nonlinear: with_supports(request, plain, mesh, plies, nonlinear=nonlinear),
     )
-    dt = request.numerics.time_step(structure.deck)
+    dt = motion.dt or request.numerics.time_step(structure.deck)
     doubts += _doubts_of_duration(motion.duration, dt, plies.system)
     deck = request.numerics.with_program(structure.deck, dt, motion.duration)
     comments = (fixture.comment if fixture else "") + structure.comment + comment
@@ -480,7 +483,10 @@ def assemble(
         cure_segment(plies, request.cure),
         law,
         request.numerics.shear_segment(),
-        curvature_of(request.radius_x, request.radius_y),
+        curvature_of(
+            in_units("radius_x", request.radius_x, "length", plies.system),
+            in_units("radius_y", request.radius_y, "length", plies.system),
+        ),
         _preload_segment(request, plies),
         *plies.segments(),
         zones.card,
@@ -551,13 +557,13 @@ def _parse_motion(request: Request, plies: DeckPlies) -> Motion:
         in_units("velocity", strike.velocity, "length/time", system),
         in_units("energy", strike.energy, "force*length", system),
         in_units("duration", numerics.duration, "time", system),
+        in_units("dt", numerics.dt, "time", system),
     )
     check_positive(
         energy=motion.energy,
         duration=motion.duration,
-        dt=numerics.dt,
+        dt=motion.dt,
         every=numerics.every,
-        giic=request.giic,
     )
     return motion
 

@@ -51,7 +51,7 @@ class Numerics(NamedTuple):
     # Factor of the shear stiffness; by default EQUI with assumed strains, and 1 without.
     shear_factor: float | Literal["equi"] | None = None
     duration: float | str | None = None
-    dt: float | None = None
+    dt: float | str | None = None
     every: int | None = None  # steps between stored rows
     plies: RowsOfPlies | None = None  # steps between rows of ply stresses
     failure: Rows | None = None  # steps between evaluations of failure
@@ -76,9 +76,7 @@ class Numerics(NamedTuple):
         return Shear(factor, assumed=assumed) if assumed or factor != 1.0 else None
 
     def time_step(self, deck: Deck) -> float:
-        """Return the time step; by default 0.9 of the critical time step."""
-        if self.dt is not None:
-            return self.dt
+        """Return 0.9 of the critical time step."""
         mesh = generate(deck)
         if not mesh.number_of_equations:
             return 1.0  # the deck is refused later

@@ -103,14 +103,14 @@ class NewOptions:
     grading: float
     columns: str
     rows: str
-    radius_x: float | None
-    radius_y: float | None
+    radius_x: str | None
+    radius_y: str | None
     kinematics: Kinematics | None
     nonlinear: bool
     preload: tuple[str, ...] | None
     laminate: LaminateOptions
     damage: bool
-    giic: float | None
+    giic: str | None
     cure: str | None
     ply_of: dict[str, Ply]
     core: tuple[tuple[str, float], ...]
@@ -129,7 +129,7 @@ class NewOptions:
     shear: Quadrature
     shear_factor: float | Literal["equi"] | None
     duration: str | None
-    dt: float | None
+    dt: str | None
     every: int | None
     plies: tuple[int, ...] | None
     failure: int | None
@@ -208,12 +208,11 @@ class NewOptions:
 @option("--rows", default="", metavar="LIST", help="The same along y.")
 @option(
     "--radius-x",
-    type=Finite(),
-    metavar="R",
-    help="Radius of a shallow curved panel (CURV) along x; positive if the struck face is the "
-    "hollow one.",
+    metavar="R[UNIT]",
+    help="Radius of a shallow curved panel (CURV) along x, also with a unit, as in 1m; positive if "
+    "the struck face is the hollow one.",
 )
-@option("--radius-y", type=Finite(), metavar="R", help="The same along y.")
+@option("--radius-y", metavar="R[UNIT]", help="The same along y.")
 @option(
     "--kinematics",
     type=click.Choice(list(get_args(Kinematics))),
@@ -258,10 +257,9 @@ class NewOptions:
 )
 @option(
     "--giic",
-    type=POSITIVE,
-    metavar="G",
-    help="Toughness G_IIc of the delamination threshold (DELA), force/length; replaces the "
-    "toughness of a named ply.",
+    metavar="G[UNIT]",
+    help="Toughness G_IIc of the delamination threshold (DELA), force/length, also with a unit, as "
+    "in 800J/m^2; replaces the toughness of a named ply.",
 )
 @option(
     "--cure",
@@ -357,7 +355,11 @@ class NewOptions:
     help="Simulated time, also with a unit, as in 4ms.  [default: until the impact is over (OVER), "
     "at most 4 times the expected time]",
 )
-@option("--dt", type=POSITIVE, help="Time step.  [default: 0.9 of the critical one]")
+@option(
+    "--dt",
+    metavar="T[UNIT]",
+    help="Time step, also with a unit, as in 0.5us.  [default: 0.9 of the critical one]",
+)
 @option(
     "--every",
     type=click.IntRange(min=1),
