@@ -7,12 +7,13 @@ with an unreadable card.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 
 from fecm.deck import model
-from fecm.deck.findings import Findings
+from fecm.deck.findings import Finding, Findings
 from fecm.deck.macros import Body, compile_program
 from fecm.deck.reader import ParsedProblem
 from fecm.deck.rules import apply, apply_first
@@ -43,20 +44,6 @@ from fecm.problem.rules import (
 )
 from fecm.problem.rules import listing as listing_mode
 
-# Segments that can be judged individually.
-ALONE: tuple[type[model.Segment], ...] = (
-    model.Material,
-    model.Indentation,
-    model.Allowables,
-    model.Delamination,
-    model.Damping,
-    model.Preload,
-    model.Curvature,
-    model.Cure,
-    model.Projectile,
-    model.Shear,
-    model.Units,
-)
 ELEMENT_ERRORS = ("E303", "E304", "E305")  # after which the numbers of elements mean nothing
 
 
@@ -128,8 +115,6 @@ def _check_each_segment(checked: Problem, findings: Findings, unsound: set[str])
     if checked.deck.has(model.Impact):
         check_impact(checked, findings)
     check_segments(checked.deck, findings)
-    if (card := checked.deck.last(model.Materials)) is not None:
-        check_segment(card, findings)
     if (laminates := checked.deck.last(model.Laminates)) is not None:
         for numbered in laminates.laminates:
             apply(laminate.OF_LAYERS, findings, numbered)
@@ -145,42 +130,6 @@ def check_impact(checked: Problem, findings: Findings) -> None:
     apply(impact.OF_VELOCITY, findings, checked)
 
 
-def check_segments(deck: model.Deck, findings: Findings) -> None:
-    """Check the segments of a deck that can be judged individually."""
-    for kind in ALONE:
-        if (segment := deck.last(kind)) is not None:
-            check_segment(segment, findings)
-
-
-def check_segment(segment: model.Segment, findings: Findings) -> None:
-    """Check one of the segments of :data:`ALONE`, or the other materials of layers."""
-    match segment:
-        case model.Material():
-            apply(laminate.OF_MATERIAL, findings, segment)
-        case model.Materials():
-            apply(laminate.OF_MATERIALS, findings, segment)
-        case model.Indentation():
-            apply(contact.OF_LAW, findings, segment)
-        case model.Allowables():
-            apply(damage.OF_STRENGTHS, findings, segment)
-        case model.Delamination():
-            apply(damage.OF_DELAMINATION, findings, segment)
-        case model.Damping():
-            apply(time_step.OF_DAMPING, findings, segment)
-        case model.Preload():
-            apply(preload.ALONE, findings, segment)
-        case model.Curvature():
-            apply(curvature.ALONE, findings, segment)
-        case model.Cure():
-            apply(cure.OF_CURE, findings, segment)
-        case model.Projectile():
-            _check_projectile(segment, findings)
-        case model.Shear():
-            apply(laminate.OF_SHEAR, findings, segment)
-        case model.Units():
-            apply(units.OF_NAMES, findings, segment)
-
-
 def _check_projectile(card: model.Projectile, findings: Findings) -> None:
     if not apply(projectile.OF_NUMBER, findings, card):
         return
@@ -191,6 +140,41 @@ def _check_projectile(card: model.Projectile, findings: Findings) -> None:
     diameters = rod_diameters(card, findings)
     if findings.error_count == before:
         apply_first(projectile.OF_DIAMETERS, findings, card, diameters)
+
+
+def _by(rules: Iterable[Callable[[Any], list[Finding]]]) -> Callable[[Any, Findings], object]:
+    """Return the check of a segment by rules."""
+    return lambda segment, findings: apply(rules, findings, segment)
+
+
+# Checks of the segments that can be judged individually, in their order.
+OF_SEGMENT: dict[type[model.Segment], Callable[[Any, Findings], object]] = {
+    model.Material: _by(laminate.OF_MATERIAL),
+    model.Indentation: _by(contact.OF_LAW),
+    model.Allowables: _by(damage.OF_STRENGTHS),
+    model.Delamination: _by(damage.OF_DELAMINATION),
+    model.Damping: _by(time_step.OF_DAMPING),
+    model.Preload: _by(preload.ALONE),
+    model.Curvature: _by(curvature.ALONE),
+    model.Cure: _by(cure.OF_CURE),
+    model.Projectile: _check_projectile,
+    model.Shear: _by(laminate.OF_SHEAR),
+    model.Units: _by(units.OF_NAMES),
+    model.Materials: _by(laminate.OF_MATERIALS),
+}
+
+
+def check_segments(deck: model.Deck, findings: Findings) -> None:
+    """Check the segments of a deck that can be judged individually."""
+    for kind, check in OF_SEGMENT.items():
+        if (segment := deck.last(kind)) is not None:
+            check(segment, findings)
+
+
+def check_segment(segment: model.Segment, findings: Findings) -> None:
+    """Check one segment, if it can be judged individually."""
+    if (check := OF_SEGMENT.get(type(segment))) is not None:
+        check(segment, findings)
 
 
 def _check_points(checked: Problem, findings: Findings) -> None:
