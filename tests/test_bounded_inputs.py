@@ -155,6 +155,15 @@ def test_a_file_of_one_repeated_character_is_refused_at_once(name: str, tmp_path
         read(tmp_path / file)
 
 
+def test_a_physical_group_with_a_long_name_is_refused_before_meshio_reads_it(
+    tmp_path: Path,
+) -> None:
+    text = '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n1 1 "' + "a" * 20_000
+    (tmp_path / "a.msh").write_text(text)
+    with pytest.raises(FecmError, match=r"a\.msh has a physical group with a name of more than"):
+        read_mesh(tmp_path / "a.msh")
+
+
 @pytest.mark.parametrize(
     "read",
     [

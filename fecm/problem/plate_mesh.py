@@ -77,6 +77,7 @@ ABAQUS_ONCE = {
 ABAQUS_UNREAD = (
     rb"\*(system|ngen|nfill|nmap|ncopy|elgen|elcopy)\s*(,|$)|\*node\s*,.*\bsystem\s*=\s*[cs]"
 )
+LONGEST_NAME = 10_000  # characters of the name of a group
 HEAD = 10_000  # bytes that identify the program of a file
 SAME = 1e-9  # largest difference of equal coordinates, over the size of the mesh
 NO_AREA = 1e-12  # largest area of a degenerate element, over the square of the size
@@ -296,6 +297,12 @@ def _check_whole(path: Path, text: bytes) -> None:
         raise MeshError(f"{path} refers to other files, which are not read; put it into one file")
     if abaqus:
         _check_abaqus(path, text)
+    names = text.partition(b"$PhysicalNames")[2].partition(b"$EndPhysicalNames")[0]
+    if max(map(len, names.splitlines()), default=0) > LONGEST_NAME:  # meshio takes seconds for it
+        raise MeshError(
+            f"{path} has a physical group with a name of more than {LONGEST_NAME} characters; "
+            "give it a shorter one"
+        )
 
 
 def _check_abaqus(path: Path, text: bytes) -> None:
