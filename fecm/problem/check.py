@@ -173,8 +173,9 @@ def check_segments(deck: model.Deck, findings: Findings) -> None:
 
 def check_segment(segment: model.Segment, findings: Findings) -> None:
     """Check one segment, if it can be judged individually."""
-    if (check := OF_SEGMENT.get(type(segment))) is not None:
-        check(segment, findings)
+    for kind, check in OF_SEGMENT.items():
+        if isinstance(segment, kind):
+            check(segment, findings)
 
 
 def _check_points(checked: Problem, findings: Findings) -> None:
