@@ -1,4 +1,4 @@
-"""Cases that are run one by one, as ``fecm run`` does, and their validity."""
+"""Full runs of cases, as ``fecm run`` does, and the validity of cases."""
 
 from __future__ import annotations
 

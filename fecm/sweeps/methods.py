@@ -9,6 +9,7 @@ are split into tasks, what they cost, and why a plan is refused.
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -64,12 +65,12 @@ MOST_REDUCED = 256  # impacts on a reduced plate at once, whose steps cost more
 MOST_IN_MOTION = 16  # full runs in one motion
 
 
-class _OnSharedPlate(Method):
+class SharedPlate(Method):
     """Cases of one plate are impacts on it that a back end advances together."""
 
+    @abstractmethod
     def backend(self, problem: Problem, settings: Settings) -> Backend:
         """Return the back end of a plate."""
-        raise NotImplementedError
 
     def outcomes(self, task: Task) -> list[Outcome]:
         """Compute cases that share a plate."""
@@ -105,7 +106,7 @@ class _OnSharedPlate(Method):
 
 @lru_cache(maxsize=2)
 def _plate(
-    method: _OnSharedPlate, settings: Settings, of_plate: tuple[tuple[str, Value], ...]
+    method: SharedPlate, settings: Settings, of_plate: tuple[tuple[str, Value], ...]
 ) -> tuple[Problem, Backend]:
     """Return the problem of a plate, given by values of names, and its back end."""
     case: Case = dict(of_plate)
@@ -114,7 +115,7 @@ def _plate(
 
 
 @dataclass(frozen=True)
-class SharedResponse(_OnSharedPlate):
+class SharedResponse(SharedPlate):
     """Impacts on a linear plate by convolution with its response."""
 
     def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
@@ -149,7 +150,7 @@ def _runs_of_case(definition: Plan) -> int:
 
 
 @dataclass(frozen=True)
-class ReducedModes(_OnSharedPlate):
+class ReducedModes(SharedPlate):
     """Impacts on a nonlinear plate in some bending modes, beside full runs of some cases."""
 
     def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
@@ -210,7 +211,7 @@ def _modes(settings: Settings) -> int:
     return settings.modes
 
 
-class _InFull(Method):
+class InFull(Method):
     """Cases are run in full on any plate."""
 
     shared: Collection[str] = ()  # names of values in which cases of one run may differ
@@ -240,7 +241,7 @@ class _InFull(Method):
 
 
 @dataclass(frozen=True)
-class SharedMotion(_InFull):
+class SharedMotion(InFull):
     """Full runs; cases that differ only in values of failure have one motion."""
 
     shared = FAILURE_NAMES
@@ -276,15 +277,13 @@ class SharedMotion(_InFull):
             outcomes = run_in_full(problems, settings.measures, law=settings.law)
         except CasesError as error:
             return [*invalid, Outcome.failed(dict.fromkeys(problems, str(error)))]
-        cases = dict(zip(task.numbers, task.cases, strict=True))
-        for outcome in outcomes:
-            for number in outcome.numbers:
-                with_hit(outcome, problems[number], cases[number])
-        return [*invalid, *outcomes]
+        # The cases have the same impact point, as they have the same motion.
+        hit = next(iter(problems.values())), task.cases[0]
+        return [*invalid, *(with_hit(outcome, *hit) for outcome in outcomes)]
 
 
 @dataclass(frozen=True)
-class SeparateRuns(_InFull):
+class SeparateRuns(InFull):
     """Full runs of each case, on a plate of its own, also by functions and for searches."""
 
     def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
