@@ -81,7 +81,7 @@ def test_a_class_follows_the_corridor_of_sae_j211(size: int, unit: str) -> None:
     second = {"s": 1.0, "ms": 1e3}[unit]
     filtered = filter_of(f"cfc:{size}").in_unit(unit)
     period = 1.0 / size
-    time = np.arange(-8.0 * period, 8.0 * period, 2e-3 * period)
+    time = np.arange(-8.0 * period, 8.0 * period, 4e-3 * period)
 
     def gain(frequency: float) -> float:
         answer = filtered(time * second, np.cos(2.0 * np.pi * frequency * time))

@@ -92,6 +92,7 @@ def test_a_turn_before_separation_reloads_from_where_it_turned() -> None:
     assert forces[2] == pytest.approx(top * ((1.6e-3 - origin) / (peak - origin)) ** 1.5, rel=1e-12)
 
 
+@settings(max_examples=40)
 @given(
     st.lists(indentations, min_size=1, max_size=30),
     st.sampled_from(
@@ -115,6 +116,7 @@ def test_the_force_is_continuous_at_every_turn(
         last = ContactPoint(indentation, force)
 
 
+@settings(max_examples=40)
 @given(st.lists(indentations, min_size=2, max_size=30))
 def test_a_closed_path_never_gives_energy_back(path: list[float]) -> None:
     # Walked in small steps, out and back to zero: the work done on the law is not negative.

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import fecm
@@ -69,6 +69,7 @@ def layups(draw: st.DrawFn) -> Item:
     return text, found
 
 
+@settings(max_examples=40)
 @given(layups(), st.sampled_from(SEPARATORS))
 def test_plies_written_in_one_notation_are_read_as_these_plies(layup: Item, mark: str) -> None:
     text, found = layup
@@ -77,6 +78,7 @@ def test_plies_written_in_one_notation_are_read_as_these_plies(layup: Item, mark
     assert parse_layup(written) == found
 
 
+@settings(max_examples=40)
 @given(layups(), st.data())
 def test_plies_written_in_several_notations_are_read_as_these_plies_or_refused(
     layup: Item, data: st.DataObject

@@ -111,6 +111,7 @@ def test_a_criterion_that_reaches_1_below_the_threshold_is_named_beside_it(faile
     assert "reaches 1 before" not in "\n".join(run_summary(failed))
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_verdict_and_table_of_a_page_name_one_ply_for_the_first_failure(failed: Result) -> None:
     made = page_of({"failed": failed})
     (results,) = (section for section in made.sections if section.title == "Results")
