@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+import fecm
 from fecm._text import significant
-from fecm.deck import quantity
+from fecm.deck import quantity, unit_names
+from tests.decks import small
 
 
 @pytest.mark.parametrize(
@@ -32,3 +34,18 @@ def test_masses_are_shown_in_grams_and_energies_in_joules(
     value: float, unit: str, text: str
 ) -> None:
     assert quantity(value, unit) == text
+
+
+@pytest.mark.parametrize(
+    ("card", "names"),
+    [
+        ("MM n S", ("mm", "N", "s")),
+        ("IN LBF S", ("in", "lbf", "s")),
+        ("mm Mn s", ("mm", "Mn", "s")),  # MN or mN
+    ],
+)
+def test_capitals_of_a_unit_are_its_usual_ones_unless_they_tell_two_units_apart(
+    card: str, names: tuple[str, ...]
+) -> None:
+    deck = fecm.read_one(small().replace("ROD", f"UNIT\n{card}\nROD", 1))
+    assert tuple(unit_names(deck).values()) == names
