@@ -113,7 +113,7 @@ def test_a_flat_deck_is_that_of_before(tmp_path: Path) -> None:
     assert held(fecm.read_one(path))["inside"] == {"u", "v"}
 
 
-@pytest.mark.parametrize("radius", [0.0, math.inf, math.nan, "1000"])
+@pytest.mark.parametrize("radius", [0.0, math.inf, math.nan])
 def test_what_is_no_radius_is_refused(radius: Any) -> None:
     with pytest.raises(ObjectError, match=r"`radius_y` is .* must be a finite number other than 0"):
         panel(radius_y=radius)
@@ -122,7 +122,7 @@ def test_what_is_no_radius_is_refused(radius: Any) -> None:
 @pytest.mark.parametrize(
     ("radius", "words"),
     [("0", "--radius-x is 0.0; it must be a finite number other than 0"),
-     ("inf", "'inf' is not a finite number"), ("nan", "'nan' is not a finite number"),
+     ("inf", "--radius-x is 'inf', not a number"), ("nan", "--radius-x is 'nan', not a number"),
      ("10", "error[E523]: The midplane of CURV has a slope of 1.5")],
 )  # fmt: skip
 def test_wrong_radii_of_the_command_are_refused_and_nothing_is_written(
