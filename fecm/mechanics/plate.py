@@ -343,7 +343,7 @@ class PlateModel:
         Returns
         -------
         ndarray (numnp, 5)
-            u, v, w, theta_x, theta_y of every node.
+            Values of u, v, w, theta_x, theta_y at every node.
         """
         full = scale * self.mesh.forces
         full[self._free] = displacement
