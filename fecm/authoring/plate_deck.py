@@ -65,15 +65,17 @@ def plate_deck(
         Place of the force; the middle of the plate by default.
     patch : str or Patch or None
         Area of the force, as in :func:`fecm.impact`. None is a force on the nearest node.
-    units, in_plane, radius_x, radius_y, shear, shear_factor, preload, gages, cure, title : optional
-        As in :func:`fecm.impact`.
-    zones : sequence of tuple, optional
+    units : str, optional
         As in :func:`fecm.impact`.
     kinematics : str
         ``"linear"``, or ``"von-karman"`` for a plate that stretches as it bends (NONL). Its static
         solution is a loop with TANG, FORM, SOLV and CONV.
+    in_plane, radius_x, radius_y, shear, shear_factor, preload, gages : optional
+        As in :func:`fecm.impact`.
     failure : bool
         Add the strengths of named plies, for FAIL and PLYS in the program.
+    cure, title, zones : optional
+        As in :func:`fecm.impact`.
 
     Returns
     -------
