@@ -38,7 +38,7 @@ def first_force(result: fecm.Result) -> dict[str, float]:
         (weak(), {"until": {"exposure": 1.0}}, "SeparateRuns"),
         (DECK, {}, "SharedMotion"),
         (DECK, {"until": 50.0}, "SeparateRuns"),
-        (DECK, {"model": "reduced"}, "ReducedModes"),
+        (DECK, {"model": "reduced"}, "ReducedRuns"),
     ],
 )
 def test_deck_and_options_decide_the_method_of_a_sweep(

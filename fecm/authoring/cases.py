@@ -187,9 +187,9 @@ def _measured_column(values: Sequence[object], unit: str, system: str | None) ->
     column = np.array(numbers, float)
     names = units_of(system) if system else {}
     for dimension in CONVERTED if names else ():
-        size, one = unit_in_si(plain_unit(unit), dimension), in_si(dimension, names)
-        if size is not None and one is not None:
-            return MeasuredColumn(column * (size / one), unit_of(dimension, names), dimension)
+        size, deck_size = unit_in_si(plain_unit(unit), dimension), in_si(dimension, names)
+        if size is not None and deck_size is not None:
+            return MeasuredColumn(column * (size / deck_size), unit_of(dimension, names), dimension)
     return MeasuredColumn(column, unit, "")
 
 

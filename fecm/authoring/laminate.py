@@ -242,8 +242,8 @@ class Laminate:
         default = self.ply_thickness
         if isinstance(default, Mapping):
             default = default.get(ply.name)
-        given = default if ply.thickness is None else ply.thickness
-        thickness = in_units("ply_thickness", given, "length", system)
+        stated = default if ply.thickness is None else ply.thickness
+        thickness = in_units("ply_thickness", stated, "length", system)
         check_positive(ply_thickness=thickness)
         return thickness
 

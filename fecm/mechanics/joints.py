@@ -116,8 +116,8 @@ def coincident(places: Floats, sides: ElementSides) -> Indices:
     if not (np.diff(np.sort(along)) <= reach).any():
         return np.zeros((0, 2), np.intp)
     lowest = _lowest_of_equal(places)
-    others = np.flatnonzero(lowest != np.arange(len(places)))
-    rows = np.delete(np.arange(len(places)), others)
+    repeated = np.flatnonzero(lowest != np.arange(len(places)))
+    rows = np.delete(np.arange(len(places)), repeated)
     order = rows[np.argsort(along[rows])]
     sorted_along = along[order]
     last = np.searchsorted(sorted_along, sorted_along + reach, side="right")
@@ -127,8 +127,8 @@ def coincident(places: Floats, sides: ElementSides) -> Indices:
         x, y = (places[pairs[:, 1]] - places[pairs[:, 0]]).T
         matches.append(pairs[np.hypot(x, y) <= distance])
     near = np.concatenate(matches)
-    joined = representatives(len(places), near)[lowest[others]]
-    return np.concatenate([near, np.column_stack([joined, others])])
+    joined = representatives(len(places), near)[lowest[repeated]]
+    return np.concatenate([near, np.column_stack([joined, repeated])])
 
 
 def _lowest_of_equal(places: Floats) -> Indices:

@@ -129,12 +129,12 @@ def _sets(
 def _members(card: AbaqusCard, every: Integers, sets: Mapping[str, Integers]) -> Integers:
     """Return the numbers of the members of a set."""
     if "GENERATE" in card.parameters:
-        taken = np.zeros(len(every), bool)
+        in_set = np.zeros(len(every), bool)
         for line in card.data:
             first, last, *step = (int(word) for word in line.replace(",", " ").split())
             step = step or [1]
-            taken |= (every >= first) & (every <= last) & ((every - first) % step[0] == 0)
-        return every[taken]
+            in_set |= (every >= first) & (every <= last) & ((every - first) % step[0] == 0)
+        return every[in_set]
     kind = "node" if card.keyword == "NSET" else "element"
     words = [word.strip() for line in card.data for word in line.split(",") if word.strip()]
     numbers = np.array([int(word) for word in words if re.fullmatch("[0-9]+", word)], int)

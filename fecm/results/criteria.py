@@ -114,8 +114,8 @@ def yield_stress(deck: Deck, material: int) -> float:
 
     system = system_of(deck)
     named = named_ply(deck.plies[material], system)
-    known = None if named is None or system is None else named.allowables(system)
-    return 0.0 if known is None else known.xt
+    strengths = None if named is None or system is None else named.allowables(system)
+    return 0.0 if strengths is None else strengths.xt
 
 
 def is_isotropic(deck: Deck, material: int) -> bool:

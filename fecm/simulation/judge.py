@@ -469,7 +469,7 @@ def _coarse_elements(simulation: Simulation, result: Result) -> Iterator[str]:
         f"{factor * reach:.3g} {unit}".rstrip()
         for factor in (mesh.coarseness, 1.0, mesh.resolved, mesh.bending_reach)
     )
-    known = "have a wide band" if mesh.is_measured else "are not bounded"
+    band = "have a wide band" if mesh.is_measured else "are not bounded"
     compare = "compare them with those of a finer mesh (fecm check --mesh-error)"
     if not mesh.nine_nodes:
         why = f"the elements there do not have nine nodes; {compare}"
@@ -484,7 +484,7 @@ def _coarse_elements(simulation: Simulation, result: Result) -> Iterator[str]:
             f"the elements there have sides of {side}, and c + h/2 is {radius}; refine the mesh at "
             f"the load to sides of {needed}{where}"
         )
-    yield f"exposures at the load {known}: {why}"
+    yield f"exposures at the load {band}: {why}"
 
 
 def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:

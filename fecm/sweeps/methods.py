@@ -150,7 +150,7 @@ def _runs_of_case(definition: Plan) -> int:
 
 
 @dataclass(frozen=True)
-class ReducedModes(SharedPlate):
+class ReducedRuns(SharedPlate):
     """Impacts on a nonlinear plate in some bending modes, beside full runs of some cases."""
 
     def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
@@ -387,7 +387,7 @@ def _from_quick_models(problem: Problem, impacts: Impacts, levels: Floats) -> Im
 
 SEPARATE_RUNS = SeparateRuns()
 # The first one that applies computes a plan.
-METHODS: tuple[Method, ...] = (ReducedModes(), SharedMotion(), SharedResponse(), SEPARATE_RUNS)
+METHODS: tuple[Method, ...] = (ReducedRuns(), SharedMotion(), SharedResponse(), SEPARATE_RUNS)
 
 
 def method_of(checked: Problem, settings: Settings, names: Collection[str]) -> Method:
