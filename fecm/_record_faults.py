@@ -105,7 +105,7 @@ def _limits(name: str, values: Floats, event: Bools, step: float) -> Iterator[st
         falls = [limit - float(part.min()) for part in (before, behind) if len(part)]
         is_largest = abs(limit) == np.abs(values).max()
         if len(rows) < AT_LIMIT or len(falls) < (1 if is_largest else 2):
-            continue  # a state of rest at the begin or the end
+            continue  # a state of rest at the start or the end
         if min(falls) <= STEEP * step:
             continue  # a flat top of rounded values
         yield (

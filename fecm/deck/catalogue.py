@@ -328,9 +328,10 @@ MATERIALS = read_plies(_read_resource("materials.toml"))
 
 
 def nu23_of(ply: Ply, system: str | None) -> float:
-    """Return Poisson's ratio nu23 of the named ply with these constants, or that of the constants.
+    """Return Poisson's ratio nu23 of a ply.
 
-    The latter is :func:`poissons_ratio_across`.
+    A named ply with these constants has its own value. Otherwise the value follows from the
+    constants by :func:`poissons_ratio_across`.
     """
     if (named := named_ply(ply, system)) is not None:
         return named.nu23
