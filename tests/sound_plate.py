@@ -13,7 +13,7 @@ from fecm.problem import load_deck
 # Codes of the rules on test; that of the mesh, W415, depends on the decks' few elements.
 RULES = re.compile(
     "[NW](430|434|435|437|438|440|446|463|467|468|469|470|471|472|473|474|475|476|477|478|479|480|481|482"
-    "|550|551|552|553|554|555|556|557|558|583|584|585|586|587|588)"
+    "|550|551|552|553|554|555|556|557|558|568|569|583|584|585|586|587|588)"
 )
 STRENGTHS = (2326.2, 1200.1, 62.3, 199.8, 92.3, 92.3, 92.3)
 Edit = Callable[[str], str]

@@ -134,6 +134,32 @@ MISTAKES: dict[str, tuple[Edit, str, str]] = {  # change, code, and what the tex
     "radius of the indenter for the patch of a thick plate": (
         lambda text: with_card("PATC", "DISC,8.,")(thick(text)), "W475",
         "radius of the indenter"),
+    "moduli in ksi": (
+        with_ply(e1=24862.4, e2=1316.94, g12=767.25, g13=767.25, g23=470.34), "W435",
+        "E2 1316.94 is 1.32e+09 Pa, outside 3e+09 to 2e+12 (looks like ksi; mm, N and s need MPa)"),
+    "moduli of aramid in ksi": (
+        with_ply(density=1.46e-9, e1=11023.0, e2=797.7, g12=333.6, g13=333.6, g23=284.3), "W435",
+        "looks like ksi"),
+    "density tenfold": (
+        with_ply(density=1.57e-8), "W435", "is 1.57e+04 kg/m^3, outside 700 to 5000"),
+    "density a tenth": (
+        lambda text: any_step(with_ply(density=1.57e-10)(text)), "W435",
+        "is 157 kg/m^3, outside 700 to 5000"),
+    "density of a fabric tenfold": (
+        with_ply(density=1.6e-8, e1=7e4, e2=7e4, nu12=0.06, g12=5e3, g13=4e3, g23=4e3), "W435",
+        "is 1.6e+04 kg/m^3, outside 700 to 5000"),
+    "G_IIc in lbf/in": (
+        with_card("DELA", "4.5,"), "W469", "looks like lbf/in; mm, N and s need kJ/m^2"),
+    "G_IIc a tenth": (with_card("DELA", ".07879,"), "W469", "78.8 J/m^2"),
+    "damping in per cent": (
+        with_card("DAMP", "2.,"), "W479", "4.8e-05 in the lowest mode: it looks like a damping"),
+    "k tenfold": (with_card("EXPE", "420000.,0.,0.,1.5"), "W476", "about 1.2 m"),
+    "k a tenth": (
+        with_card("EXPE", "4200.,0.,0.,1.5"), "W476", "a digit is missing or the tip is soft"),
+    "radius of the patch in m": (
+        with_card("PATC", "DISC,.00096,"), "W568", "looks like m; mm, N and s need mm"),
+    "preload in kN/mm": (
+        with_card("PREL", ".02,0.,0."), "W569", "has no effect: it strains the plate by 1.1e-07"),
     "velocity in m/s": (
         replaced(r"^(ROD\n.{10}).*", r"\g<1>      1.73"), "W435", "looks like m/s"),
 }  # fmt: skip

@@ -11,6 +11,7 @@ from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import COEFFICIENT, in_si, unit_names
 from fecm.mechanics.contact_law import ACR_POWER
+from fecm.mechanics.laminate import is_fabric
 from fecm.problem.problem import Problem
 from fecm.problem.rules.units import REAL, USED, has_real_moduli, needed_unit
 
@@ -22,12 +23,14 @@ SMALLEST_SLOPE = 0.02
 USUAL_SLOPES = (0.03, 0.5)
 # Limits of the radius of the rigid sphere that has the law's k: in m if the deck has UNIT,
 # otherwise over the thickness and over the longer side of the plate.  The report's laws and
-# isotropic plates give radii from a third to 25 times the radius of the indenter.
-LEAST_RADIUS = 3e-5
-GREATEST_RADIUS = 5.0
+# isotropic plates give radii from a third to 25 times the radius of the indenter, which is 1 mm or
+# more.
+LEAST_RADIUS = 1.5e-4
+GREATEST_RADIUS = 0.8
 LEAST_OF_THICKNESS = 6e-3
 MOST_OF_SIDE = 100.0
 USUAL_RADIUS = 8e-3  # m
+E_T_OF_G23 = 2.8  # 2 (1 + nu) of a matrix with nu = 0.4
 REACH = 8.0  # greatest ratio to the usual radius at which a unit is named
 
 
@@ -120,19 +123,21 @@ def exchanged_constants(problem: Problem) -> Reports:
 def sphere_radius(problem: Problem) -> float:
     """Return the radius of a rigid sphere with the k of a problem, length.
 
-    The radius follows from equation 3-2 with E2 for E_t.
+    The radius follows from equation 3-2 with E2 for E_t. Across a fabric E_t is that of its matrix.
     """
-    k, e2 = problem.contact_coefficient, problem.deck.require(model.Material).ply.e2
+    k, ply = problem.contact_coefficient, problem.deck.require(model.Material).ply
+    modulus = E_T_OF_G23 * ply.g23 if is_fabric(ply) else ply.e2
     with np.errstate(all="ignore"):
-        return float((0.75 * np.float64(k) / e2) ** 2)
+        return float((0.75 * np.float64(k) / modulus) ** 2)
 
 
 @rule("W476", Subject.IMPACT)
 def doubtful_coefficient(problem: Problem) -> Reports:
     """K belongs to a sphere of an impossible radius.
 
-    By equation 3-2 with E2 the radius is smaller than 0.03 mm or larger than 5 m (without UNIT:
-    smaller than 0.006 of the thickness, or larger than 100 plates).
+    By equation 3-2 with E2 the radius is smaller than 0.15 mm or larger than 0.8 m (without UNIT:
+    smaller than 0.006 of the thickness, or larger than 100 plates). A soft tip has a small radius
+    too.
 
     Remedy: k in force/length^1.5; `fecm indent estimate`.
     """
@@ -159,8 +164,11 @@ def doubtful_coefficient(problem: Problem) -> Reports:
     message = (
         f"k = {law.k:g} belongs to a rigid sphere with a radius of about {shown} on the plies' E2"
     )
-    if unit is not None and (looks := _misread(deck, radius, unit, names)):
-        message += f"; {looks}"
+    if unit is not None:
+        is_small = radius * unit < LEAST_RADIUS
+        looks = _misread(deck, radius, unit, names)
+        message += f"; {looks}, or" if looks else ";"
+        message += " a digit is missing or the tip is soft" if is_small else " a digit is too many"
     hint = "k is in force/length^1.5 of the deck; fecm indent estimate has one for a sphere"
     yield Report(f"{message}.", law.place(law.names()[0]), hint)
 

@@ -51,6 +51,9 @@ ORDERS = {
 # G_IIc, J/m^2.
 LOWEST_TOUGHNESS = 50.0
 HIGHEST_TOUGHNESS = 5000.0
+# G_IIc of plies of parallel fibres, J/m^2; the first epoxies have 154, PEEK 3000.
+LOWEST_OF_FIBRES = 150.0
+HIGHEST_OF_FIBRES = 4000.0
 USUAL_TOUGHNESS = 700.0
 # G_IIc/(E2 h) of plates from 0.5 to 20 mm.
 LOWEST_RELATIVE = 1e-7
@@ -268,7 +271,8 @@ def weak_in_shear(problem: Problem) -> Reports:
 def doubtful_toughness(problem: Problem) -> Reports:
     """No laminate has this G_IIc.
 
-    It is outside 50 to 5000 J/m² (without UNIT: G_IIc/(E2 h) outside 10⁻⁷ to 5·10⁻³).
+    It is outside 150 to 4000 J/m² if E1 > 2 E2, and otherwise outside 50 to 5000 J/m² (without
+    UNIT: G_IIc/(E2 h) outside 10⁻⁷ to 5·10⁻³).
 
     Remedy: N/mm is 1000 J/m², lbf/in 175 J/m².
     """
@@ -278,9 +282,13 @@ def doubtful_toughness(problem: Problem) -> Reports:
     place, value = card.place("G_IIc"), card.toughness
     factor = in_si(TOUGHNESS, names)
     if factor is not None:
-        if LOWEST_TOUGHNESS <= value * factor <= HIGHEST_TOUGHNESS:
+        ply = deck.require(model.Material).ply
+        least, greatest = LOWEST_TOUGHNESS, HIGHEST_TOUGHNESS
+        if ply.e1 > FIBROUS * ply.e2:
+            least, greatest = LOWEST_OF_FIBRES, HIGHEST_OF_FIBRES
+        if least <= value * factor <= greatest:
             return
-        limits = f"{LOWEST_TOUGHNESS:g} to {HIGHEST_TOUGHNESS:g}"
+        limits = f"{least:g} to {greatest:g}"
         message = f"G_IIc = {value:g} is {value * factor:.3g} J/m^2 in the units of UNIT"
         message += f", outside {limits}"
         if looks := looks_like(value, TOUGHNESS, USUAL_TOUGHNESS, names):

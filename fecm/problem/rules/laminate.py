@@ -229,7 +229,7 @@ def doubtful_poissons_ratio(problem: Problem) -> Reports:
             yield Report(message, place, "NU12 of fibre composites is 0.2 to 0.4")
 
 
-def _is_fibrous(ply: model.Ply) -> bool:
+def is_fibrous(ply: model.Ply) -> bool:
     """Return whether a ply has parallel fibres; the cells of a core are stiffer in shear."""
     return ply.e1 > FIBROUS * ply.e2 and max(ply.g13, ply.g23) < ply.e1
 
@@ -246,7 +246,7 @@ def doubtful_shear_modulus(problem: Problem) -> Reports:
     """
     for ply in problem.deck.plies.values():
         moduli = {"G12": ply.g12, "G13": ply.g13, "G23": ply.g23}
-        if _is_fibrous(ply) and ply.e1 <= LARGEST_MODULI_RATIO * ply.e2:  # W584 reports it
+        if is_fibrous(ply) and ply.e1 <= LARGEST_MODULI_RATIO * ply.e2:  # W584 reports it
             wrong = {
                 name: f"{name}/E2 = {moduli[name] / ply.e2:.2g}"
                 for name, (least, most) in SHEAR_OF_FIBROUS.items()
@@ -320,7 +320,7 @@ def exchanged_shear_moduli(problem: Problem) -> Reports:
     Remedy: G12, G13, G23.
     """
     for ply in problem.deck.plies.values():
-        if not _is_fibrous(ply):
+        if not is_fibrous(ply):
             continue
         if min(ply.g13, ply.g23) > MOST_EXCHANGED * ply.g12:
             first, others = "G12", f"G13 = {ply.g13:g} and G23 = {ply.g23:g}"

@@ -10,16 +10,19 @@ from fecm._typing import Bools, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat
 from fecm.deck.rules import Report, Reports, Subject, reports, rule
+from fecm.deck.units import in_si, unit_names
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.mesh import MeshArrays, longest_sides
 from fecm.mechanics.points import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError
 from fecm.problem.contact_estimates import expected_peak
 from fecm.problem.problem import ContactPatch, Problem
 from fecm.problem.rules.contact import sphere_radius
+from fecm.problem.rules.units import looks_like
 from fecm.results.exposure_bands import RESOLVED
 
 LARGE = 2.0  # radius of a patch over the thickness, and over the radius of the contact
 INDENTER = 0.5  # radius of a patch over that of a sphere with the deck's k
+SMALL = 0.01  # radius of a patch over the thickness; contacts of spheres have 0.05 and more
 
 
 @rule("E442", Subject.POINTS)
@@ -272,6 +275,32 @@ def large_patch_without_stresses(problem: Problem) -> Reports:
         yield Report(f"the {what}", card.place("radius c"), _radius_hint(card))
 
 
+@rule("W568", Subject.POINTS)
+def small_patch(problem: Problem) -> Reports:
+    """The radius of the patch is below a hundredth of the thickness.
+
+    It is likely in another unit. The load is that of a point, and stresses under it are too large.
+
+    Remedy: The radius of the contact in the deck's unit of length, or blank for 0.327 h.
+    """
+    card, thickness = problem.deck.last(model.Patch), problem.laminate.thickness
+    if card is None or card.radius is None or card.radius >= SMALL * thickness:
+        return
+    names = unit_names(problem.deck)
+    usual = RADIUS_PER_THICKNESS[card.shape] * thickness
+    factor = in_si("length", names)
+    looks = "" if factor is None else looks_like(card.radius, "length", usual * factor, names)
+    message = (
+        f"The radius of the patch, {card.radius:g}, is {card.radius / thickness:.2g} times the "
+        f"thickness"
+    )
+    yield Report(
+        f"{message}: it {looks or 'looks like another unit'}.",
+        card.place("radius c"),
+        _radius_hint(card),
+    )
+
+
 # One of these is enough.
 OF_PATCH = (
     unknown_shape,
@@ -281,4 +310,10 @@ OF_PATCH = (
     patch_off_the_plate,
     unresolved_patch,
 )
-VALUES = (blank_radius, patch_away_from_node, large_patch, large_patch_without_stresses)
+VALUES = (
+    blank_radius,
+    patch_away_from_node,
+    small_patch,
+    large_patch,
+    large_patch_without_stresses,
+)

@@ -16,6 +16,9 @@ from fecm.problem.problem import Problem
 
 FORCE = "force/length"
 LARGEST_STRAIN = 0.01  # by the preload, above which its unit is doubted
+# Strain by the preload, over the square of thickness over the longer side, below which it changes
+# the lowest frequency by less than 0.1 %. Buckling strains are of the order of 1.
+LEAST_EFFECT = 1e-3
 
 
 @rule("W485", Subject.LAMINATE)
@@ -62,6 +65,26 @@ def large_preload(problem: Problem) -> Reports:
         )
         message = f"The preload of PREL{in_newtons} strains the plate by {largest:.2%}."
         hint = "N0 is a stress times the thickness: N/mm in mm and N; 1 N/mm is 1000 N/m"
+        yield Report(message, card.place(), hint)
+
+
+@rule("W569", Subject.LAMINATE)
+def small_preload(problem: Problem) -> Reports:
+    """The preload of PREL is without effect.
+
+    The strain by the preload is below 10⁻³ (h/a)² of thickness h and longer side a; plates buckle
+    at about (h/a)².
+
+    Remedy: The unit of force over length: N/m in m and N.
+    """
+    card = problem.deck.last(model.Preload)
+    if card is None or not any(card.forces):
+        return
+    largest = float(np.abs(problem.plate.preload_strain).max())
+    slenderness = problem.laminate.thickness / problem.longer_side
+    if largest < LEAST_EFFECT * slenderness**2:
+        message = f"The preload of PREL has no effect: it strains the plate by {largest:.2g}."
+        hint = "N0 is a stress times the thickness: 1 N/mm is 1000 N/m"
         yield Report(message, card.place(), hint)
 
 
@@ -115,7 +138,7 @@ def decimal_comma(card: model.Preload) -> Reports:
 
 ALONE = (no_preload, decimal_comma)
 OF_PRELOAD = (preload_of_coupled_laminate, preload_of_unlike_laminates)
-VALUES = (large_preload, preload_around_hole)
+VALUES = (large_preload, small_preload, preload_around_hole)
 
 
 STIFFLESS = "PREL is far beyond the buckling load, or the plate has motions without stiffness"

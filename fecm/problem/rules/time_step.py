@@ -149,6 +149,9 @@ OF_CONTACT = (unstable_contact, wasteful_step)
 
 
 WITHOUT_EFFECT = 0.01  # damping times the duration
+# Damping ratio of the lowest mode below which a looks like a ratio; plates of metal have 5e-4.
+LEAST_DAMPING_RATIO = 2e-4
+PER_CENT = 10.0  # largest damping ratio in per cent
 WORST_RATE = 0.01  # relative error of the rate of damping
 
 
@@ -199,7 +202,8 @@ def _damping_hint(problem: Problem) -> str:
 def damping_without_effect(problem: Problem) -> Reports:
     """DAMP is without effect.
 
-    a times the simulated time is below 0.01.
+    a times the simulated time is below 0.01, or a of at most 10 is below 2·10⁻⁴ of critical
+    damping in the lowest mode.
 
     Remedy: a in 1/time, 2 ζ ω for the damping ratio ζ of a mode.
     """
@@ -214,6 +218,14 @@ def damping_without_effect(problem: Problem) -> Reports:
         )
         likeness = ": it looks like a damping ratio" if a < 1.0 else ""
         yield Report(f"{message}{likeness}.", card.place("a"), _damping_hint(problem))
+        return
+    ratio = a / (2.0 * clamped_frequency(problem))
+    if a <= PER_CENT and 0.0 < ratio < LEAST_DAMPING_RATIO:
+        message = (
+            f"The damping a = {a:g} is a damping ratio of {ratio:.2g} in the lowest mode: it looks "
+            "like a damping ratio in per cent."
+        )
+        yield Report(message, card.place("a"), _damping_hint(problem))
 
 
 @rule("W480", Subject.DAMAGE)

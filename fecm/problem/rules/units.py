@@ -24,7 +24,9 @@ from fecm.deck.units import (
     unit_names,
     unit_of,
 )
+from fecm.mechanics.laminate import is_fabric
 from fecm.problem.problem import Problem
+from fecm.problem.rules.laminate import is_fibrous
 
 # Units in which values are often given, in m, N and s, by their dimension.
 USED = {
@@ -59,12 +61,21 @@ class Range(NamedTuple):
 REAL = {
     "fibre modulus": Range(MODULUS, 1e9, 2e12, 1e11, "Pa"),
     "matrix modulus": Range(MODULUS, 1e8, 2e12, 8e9, "Pa"),
+    "matrix modulus of heavy plies": Range(MODULUS, 3e9, 2e12, 8e9, "Pa"),
     "density": Range(DENSITY, 100.0, 25e3, 2e3, "kg/m^3"),
+    "density of stiff plies": Range(DENSITY, 700.0, 5e3, 2e3, "kg/m^3"),
     "ply thickness": Range("length", 5e-6, 0.1, 2e-4, "m"),
     "rod modulus": Range(MODULUS, 1e6, 2e12, 1e11, "Pa"),
     "velocity": Range(VELOCITY, 0.01, 1000.0, 5.0, "m/s"),
     "contact coefficient": Range(COEFFICIENT, 1e6, 1e12, 1e9, "N/m^1.5"),
 }
+# E1, in Pa, from which plies have technical fibres; wood and foam are lighter than these.
+STIFF = 20e9
+# Density in kg/m^3 and E1 in Pa of plies in which E2 of about 1 GPa is that of another unit. Plies
+# of polyethylene and of flax are lighter. Soft matrices with carbon fibres have a larger E1.
+HEAVY = 1350.0
+STIFFEST_IN_KSI = 70e9
+SOFTEST_IN_KSI = 0.6e9  # E2, Pa; a smaller one is that of rubber
 # Names that are not units of length, force or time.
 OTHERS = {
     "mass": (*MASSES, "ton", "lbm", "slug"),
@@ -140,8 +151,9 @@ def unit_of_another_kind(card: model.Units) -> Reports:
 def unreal_values(problem: Problem) -> Reports:
     """A value is outside the range of real materials in the units of UNIT.
 
-    Modulus, density, thickness, velocity and k are judged. The finding names the unit that the
-    value seems to be in.
+    Modulus, density, thickness, velocity and k are judged. Plies of fibres have narrower ranges:
+    700 to 5000 kg/m³ if E1 is above 20 GPa; E2 of 3 GPa and more if E1 is below 70 GPa and the
+    density above 1350 kg/m³. The finding names the unit that the value seems to be in.
 
     Remedy: Correct the values or UNIT. Nothing is converted.
     """
@@ -172,10 +184,11 @@ def _judged(problem: Problem) -> list[tuple[str, Record, str, float]]:
     # Other materials may be cores, which are thicker than plies and softer than any matrix.
     plies = [layer for layer in layers if layer.material == MATERIAL] or layers
     thickest = max(plies, key=lambda layer: layer.thickness)
+    names = unit_names(deck)
     values: list[tuple[str, Record, str, float]] = [
-        ("density", ply, "mass density", ply.density),
+        (_kind_of_density(ply, names), ply, "mass density", ply.density),
         ("fibre modulus", ply, "Young's modulus E1", ply.e1),
-        ("matrix modulus", ply, "Young's modulus E2", ply.e2),
+        (_kind_of_e2(ply, names), ply, "Young's modulus E2", ply.e2),
         ("matrix modulus", ply, "shear modulus G12", ply.g12),
         ("matrix modulus", ply, "shear modulus G13", ply.g13),
         ("matrix modulus", ply, "shear modulus G23", ply.g23),
@@ -191,6 +204,25 @@ def _judged(problem: Problem) -> list[tuple[str, Record, str, float]]:
         values.append(("rod modulus", card, "rod's Young's modulus", card.modulus))
         values.append(("density", card, "rod's density", card.density))
     return values
+
+
+def _kind_of_density(ply: Ply, names: dict[str, str]) -> str:
+    """Return the key of :data:`REAL` for the density of a ply."""
+    of_modulus = in_si(MODULUS, names)
+    has_fibres = is_fibrous(ply) or is_fabric(ply)
+    if of_modulus is not None and has_fibres and ply.e1 * of_modulus > STIFF:
+        return "density of stiff plies"
+    return "density"
+
+
+def _kind_of_e2(ply: Ply, names: dict[str, str]) -> str:
+    """Return the key of :data:`REAL` for E2 of a ply."""
+    of_modulus, of_density = in_si(MODULUS, names), in_si(DENSITY, names)
+    if of_modulus is None or of_density is None or not is_fibrous(ply):
+        return "matrix modulus"
+    is_heavy = ply.density * of_density > HEAVY
+    is_suspect = ply.e1 * of_modulus < STIFFEST_IN_KSI and ply.e2 * of_modulus > SOFTEST_IN_KSI
+    return "matrix modulus of heavy plies" if is_heavy and is_suspect else "matrix modulus"
 
 
 OF_NAMES = (unit_of_another_kind,)
