@@ -1,12 +1,10 @@
 """Quick models of an impact without a mesh, and the static curve of a nonlinear plate.
 
-The static curve is the force of a nonlinear plate over its deflection W under the contact load.
-Newton's method finds the force F for a prescribed W.  At a displacement u with the tangent K_T and
-the residual r = F P - f(u), a step (du, dF) solves
+The static curve is the force F of a nonlinear plate over its deflection W under the contact load.
+An equilibrium has the least strain energy of all displacements u with the deflection W = P u, where
+P are the nodal forces of a unit contact force.  There f(u) = F P, and with the tangent K_T
 
-    K_T du = r + dF P,   P du = W - P u,
-
-where P are the nodal forces of a unit contact force, which also weigh the deflection.
+    du/dW = K_T^-1 P/(P K_T^-1 P),   dF/dW = 1/(P K_T^-1 P).
 
 Quick models.  Small mass (Zener 1941, Olsson 1992): the plate under the contact is a dashpot,
 a'' + 3/2 lambda sqrt(a) a' + a^1.5 = 0 in units of the contact.  Large mass: the plate, by its
@@ -34,11 +32,14 @@ CLOSE = 1.0e-8
 MOST_ITERATIONS = 30
 # The iterations fail beyond this relative change.  The first change is the whole displacement.
 MOST_CHANGE = 2.0
-# Ratio of two successive changes above which a new tangent is worth its factorisation.
-SLOW = 0.3
+# Conjugate gradients end at this residual, relative to the load: the compliance has its square.
+# A tangent that needs more products is factorised anew.
+CLOSE_DIRECTION = 1.0e-5
+MOST_PRODUCTS = 10
+DIFFERENCE = 1.0e-4  # of two displacements whose forces give a product, relative to them
 MOST_STEPS = 200
 # Steps relative to the deflection.  Steps near 0 are larger.
-LARGEST_STEP = 0.1
+LARGEST_STEP = 0.25
 SMALLEST_STEP = 1.0e-3
 
 
@@ -133,65 +134,131 @@ class _Point(NamedTuple):
 
 def _equilibria(plate: PlateModel, load: Floats, step: float) -> Iterator[_Point]:
     """Yield equilibria without end, starting at rest."""
-    membrane = MembraneForces(plate)
-    state = _State(np.zeros(plate.mesh.equations.shape), 0.0)
-    deflection, step_size = 0.0, step
+    path = _Path(plate, load)
+    u, force, deflection, step_size = np.zeros(plate.neq), 0.0, 0.0, step
+    compliant, turn = path.compliant(u), np.zeros(plate.neq)
     while True:
-        tangent = Tangent(plate, state.field)
-        compliant = tangent.solve(load)
-        stiffness = 1.0 / float(load @ compliant)
-        yield _Point(deflection, state.force, stiffness)
+        compliance = float(load @ compliant)
+        yield _Point(deflection, force, 1.0 / compliance)
+        direction = compliant / compliance  # du/dW
         step_size = max(step_size, LARGEST_STEP * deflection)
         while (
-            result := _find_equilibrium(
-                plate, membrane, load, state, tangent, deflection + step_size
-            )
+            result := path.equilibrium(u + step_size * (direction + step_size / 2.0 * turn))
         ) is None:
+            if path.renewed(u):
+                continue
             step_size /= 2.0
             if step_size < SMALLEST_STEP * (step + deflection):
                 raise ConvergenceError(f"no equilibrium beyond the deflection {deflection:.6g}")
-        state, deflection = result, deflection + step_size
+        u, deflection = result, deflection + step_size
+        compliant = path.compliant(u, compliant)
+        force = float(compliant @ path.internal(u)) / float(load @ compliant)
+        turn = (compliant / float(load @ compliant) - direction) / step_size  # d2u/dW2
 
 
-class _State(NamedTuple):
-    """Displacements, (numnp, 5), and contact force."""
+class _Update(NamedTuple):
+    """Change of the displacement and of the internal forces, (neq,), and their product."""
 
-    field: Floats
-    force: float
+    change: Floats
+    force: Floats
+    work: float
 
 
-def _find_equilibrium(
-    plate: PlateModel,
-    membrane: MembraneForces,
-    load: Floats,
-    state: _State,
-    tangent: Tangent,
-    deflection: float,
-) -> _State | None:
-    """Find the equilibrium at a deflection from a state and its tangent; None on failure."""
-    free = plate.mesh.equations > 0
-    field, force = state.field.copy(), state.force
-    compliant = tangent.solve(load)
-    last_size = math.inf
-    for _ in range(MOST_ITERATIONS):
-        u = field[free]
-        internal = plate.stiffness @ u + membrane.forces(field)[0][free]
-        # K_T^-1 (r + F P): the load keeps the right-hand side above its rounding errors.
-        change = tangent.solve(2.0 * force * load - internal)
-        added = (deflection - float(load @ (u + change))) / float(load @ compliant)
-        change += added * compliant
-        force += force + added
-        field[free] += change
-        size = float(np.abs(change).max() / np.abs(field[free]).max())
-        if size <= CLOSE:
-            return _State(field, force)
-        if not size < MOST_CHANGE:
-            return None
-        if size > SLOW * last_size:  # the tangent is too old
-            tangent = Tangent(plate, field)
-            compliant = tangent.solve(load)
-        last_size = size
-    return None
+class _Path:
+    """Equilibria of a nonlinear plate; several of them share the factors of one tangent.
+
+    Displacements, (neq,), have the deflection W = P u under the contact load.
+    """
+
+    def __init__(self, plate: PlateModel, load: Floats) -> None:
+        self._plate, self._load = plate, load
+        self._free = plate.mesh.equations > 0
+        self._membrane = MembraneForces(plate)
+        self._factorise(np.zeros(plate.neq))
+
+    def _field(self, u: Floats) -> Floats:
+        field = np.zeros(self._free.shape)
+        field[self._free] = u
+        return field
+
+    def _factorise(self, u: Floats) -> None:
+        self._place = u  # displacement of the tangent
+        self._tangent = Tangent(self._plate, self._field(u))
+        self._response = self._tangent.solve(self._load)
+
+    def renewed(self, u: Floats) -> bool:
+        """Factorise the tangent about a displacement; return False if it is factorised."""
+        if is_new := not np.array_equal(u, self._place):
+            self._factorise(u)
+        return is_new
+
+    def internal(self, u: Floats) -> Floats:
+        """Return the internal forces f(u), (neq,)."""
+        return np.asarray(
+            self._plate.stiffness @ u + self._membrane.forces(self._field(u))[0][self._free]
+        )
+
+    def equilibrium(self, u: Floats) -> Floats | None:
+        """Return the equilibrium of the deflection of a displacement; None without convergence.
+
+        It has the least strain energy, which the BFGS method finds from the tangent (J. Nocedal and
+        S. J. Wright, Numerical Optimization, algorithms 6.1 and 7.4).
+        """
+        updates: list[_Update] = []
+        internal = self.internal(u)
+        for _ in range(MOST_ITERATIONS):
+            change = self._descent(internal, updates)
+            u = u + change
+            size = float(np.abs(change).max() / np.abs(u).max())
+            if size <= CLOSE:
+                return u
+            if not size < MOST_CHANGE:
+                return None
+            before, internal = internal, self.internal(u)
+            added = internal - before
+            if (work := float(change @ added)) > 0.0:
+                updates.append(_Update(change, added, work))
+        return None
+
+    def _descent(self, internal: Floats, updates: list[_Update]) -> Floats:
+        """Return the change of the displacement, which leaves the deflection as it is."""
+        # The contact force changes nothing here: -f keeps the right-hand side above its rounding
+        # errors.
+        residual, factors = -internal, []
+        for update in reversed(updates):
+            factors.append(float(update.change @ residual) / update.work)
+            residual = residual - factors[-1] * update.force
+        change = self._tangent.solve(residual)
+        change -= float(self._load @ change) / float(self._load @ self._response) * self._response
+        for update, factor in zip(updates, reversed(factors), strict=True):
+            change += (factor - float(update.force @ change) / update.work) * update.change
+        return change
+
+    def compliant(self, u: Floats, start: Floats | None = None) -> Floats:
+        """Return the displacement per force, K_T^-1 P, at a displacement, by conjugate gradients.
+
+        The tangent is factorised anew if it is too old for them.
+        """
+        from scipy.sparse.linalg import LinearOperator, cg  # 0.2 s, which most runs don't need
+
+        if np.array_equal(u, self._place):
+            return self._response
+
+        def product(direction: Floats) -> Floats:
+            """Return K_T times a direction: half the difference of the forces beside u."""
+            change = DIFFERENCE * np.abs(u).max() / np.abs(direction).max()
+            forward, backward = (self.internal(u + c * direction) for c in (change, -change))
+            return np.asarray((forward - backward) / (2.0 * change))
+
+        K = LinearOperator((len(u), len(u)), matvec=product, dtype=np.float64)
+        M = LinearOperator(K.shape, matvec=self._tangent.approximate, dtype=np.float64)
+        compliant, failed = cg(
+            K, self._load, start, rtol=CLOSE_DIRECTION, maxiter=MOST_PRODUCTS, M=M
+        )
+        if failed:
+            self._factorise(u)
+            return self._response
+        return np.asarray(compliant)
 
 
 MIDPOINTS = 1000  # number of midpoints in quadratures over force and deflection

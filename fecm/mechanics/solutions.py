@@ -143,6 +143,10 @@ class Tangent:
             pinned = pinned + diags_array(springs, format="csr")
         self._factors = factorised(pinned)
 
+    def approximate(self, residual: Floats) -> Floats:
+        """Return the displacement under a load, (neq,), that need not be balanced."""
+        return np.asarray(self._factors.solve(residual))
+
     def solve(self, residual: Floats, displacement: Floats | None = None) -> Floats:
         """Return the displacement under a load, (neq,).
 
@@ -150,7 +154,7 @@ class Tangent:
         equilibrium the load may be the rounding error of the forces of `displacement`, which need
         not be balanced.
         """
-        change = self._factors.solve(residual)
+        change = self.approximate(residual)
         imbalance = np.abs(self._stiffness @ change - residual).max()
         limit = SINGULAR * np.abs(residual).max()
         if displacement is not None:
@@ -158,7 +162,7 @@ class Tangent:
             limit = max(limit, rounding)
         if not imbalance <= limit:
             raise SingularStiffnessError("the stiffness is singular")
-        return np.asarray(change)
+        return change
 
 
 def compliance(plate: PlateModel, load: Floats) -> float:
