@@ -304,6 +304,34 @@ def test_a_damaged_sweep_is_refused_by_name(tmp_path: Path) -> None:
         fecm.load_sweep(path)
 
 
+def test_more_texts_than_a_file_has_bytes_are_refused_before_they_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "sweep.h5"
+    fecm.sweep(small(), {"velocity": [50.0, 100.0]}, output=path)
+    with h5py.File(path, "r+") as file:
+        file.create_dataset("summary/extra", (200_000,), h5py.string_dtype(), chunks=(1000,))
+    done = call("info", path)
+    assert_unusable(done)
+    assert "summary/extra has the shape (200000,), which is more than the file holds" in done.stderr
+
+
+@pytest.mark.parametrize("group", ["/", "history"])
+def test_more_attributes_than_any_result_has_are_refused(result: Path, group: str) -> None:
+    with h5py.File(result, "r+") as file:
+        for number in range(1001):
+            file[group].attrs.create(f"a{number}", 0)
+    done = call("info", result)
+    assert_unusable(done)
+    assert "has more than 1000 attributes" in done.stderr
+
+
+def test_groups_nested_deeper_than_in_any_result_are_refused(result: Path) -> None:
+    with h5py.File(result, "r+") as file:
+        file.create_group("/".join("abcdefghijk"))
+    done = call("info", result)
+    assert_unusable(done)
+    assert "a/b/c/d/e/f/g/h/i/j/k is nested in 10 groups or more" in done.stderr
+
+
 @pytest.mark.links
 def test_a_pipe_in_a_folder_of_tapes_is_refused(result: Path) -> None:
     os.mkfifo(result.with_name("tape3"))

@@ -45,6 +45,8 @@ LINKS = {
 OF_SCALES = {"DIMENSION_LIST", "REFERENCE_LIST"}
 FIRST = 4096  # number of bytes that identify a deck
 DECK = re.compile(rb"\A[^\0]*^ *FECM\b", re.IGNORECASE | re.MULTILINE)
+MOST_ATTRIBUTES = 1000  # of a group; a result has fewer than 100
+DEPTH = 10  # of nested groups; a result has at most 3
 PACKED = 2000  # upper bound of the compression of HDF5's filters; deflate reaches 1032
 
 
@@ -202,14 +204,19 @@ def _open_file(file: AnyFile) -> tuple[Path, io.BytesIO]:
 
 
 def _check_links(path: Path, file: h5py.File) -> None:
-    """Refuse all but hard links."""
+    """Refuse all but hard links, and groups that are nested deeper than in any result."""
 
-    def soft_or_external(name: str | bytes, info: Any) -> tuple[str, int] | None:
-        return None if info.type == h5py.h5l.TYPE_HARD else (_text(name), info.type)
+    def unsupported(name: str | bytes, info: Any) -> tuple[str, int] | None:
+        text = _text(name)
+        is_hard = info.type == h5py.h5l.TYPE_HARD
+        return None if is_hard and text.count("/") < DEPTH else (text, info.type)
 
-    if link := file.id.links.visit(soft_or_external, info=True):
-        what = LINKS.get(link[1], "a link of unsupported kind")
-        raise ResultFileError(f"{path}: {link[0]} is {what}; links are not followed")
+    if link := file.id.links.visit(unsupported, info=True):
+        name, kind = link
+        if kind == h5py.h5l.TYPE_HARD:
+            raise ResultFileError(f"{path}: {short_text(name)} is nested in {DEPTH} groups or more")
+        what = LINKS.get(kind, "a link of unsupported kind")
+        raise ResultFileError(f"{path}: {name} is {what}; links are not followed")
 
 
 def _list(contents: FileContents, file_size: int, name: str, item: Any) -> None:
@@ -233,19 +240,20 @@ def _list(contents: FileContents, file_size: int, name: str, item: Any) -> None:
     is_text = h5py.check_string_dtype(dtype) is not None
     if "/" not in name and h5py.h5ds.is_scale(item):
         return  # a scale numbers an axis
+    is_packed = created.get_layout() == h5py.h5d.CHUNKED and not is_text
+    room = file_size * (PACKED if is_packed else 1)
+    # A damaged shape could have more rows than any disk holds. A text takes a byte or more.
+    if math.prod(map(int, shape or ())) * (1 if is_text else dtype.itemsize) > room:
+        message = f"{path}: {name} has the shape {shape}, which is more than the file holds"
+        raise ResultFileError(message)
     if is_text and shape == ():
         contents.texts[name] = str(_plain(h5py.Dataset(item)[()]))
     elif is_text and contents.form == Form.SWEEP and shape is not None and len(shape) == 1:
         contents.lists[name] = [str(_plain(value)) for value in h5py.Dataset(item)[()].tolist()]
         contents.shapes[name], contents.dtypes[name] = shape, np.dtype(object)
     elif dtype.kind in "biuf" and shape is not None and not dtype.shape:
-        shape = tuple(map(int, shape))
-        room = file_size * (PACKED if created.get_layout() == h5py.h5d.CHUNKED else 1)
-        # A damaged shape could have more rows than any disk holds.
-        if math.prod(shape) * dtype.itemsize > room:
-            message = f"{path}: {name} has the shape {shape}, which is more than the file holds"
-            raise ResultFileError(message)
-        contents.shapes[name], contents.dtypes[name] = shape, dtype.newbyteorder("=")
+        contents.shapes[name] = tuple(map(int, shape))
+        contents.dtypes[name] = dtype.newbyteorder("=")
     else:
         references = h5py.check_ref_dtype(dtype) is not None
         what = "references; they are not followed" if references else "neither numbers nor a text"
@@ -255,6 +263,8 @@ def _list(contents: FileContents, file_size: int, name: str, item: Any) -> None:
 def _attributes(item: h5py.HLObject) -> dict[str, Any]:
     """Return attributes as Python values, without those that tie an axis to its scale."""
     values: dict[str, Any] = {}
+    if len(item.attrs) > MOST_ATTRIBUTES:
+        raise ValueError(f"{item.name} has more than {MOST_ATTRIBUTES} attributes")
     for name in item.attrs:
         if name in OF_SCALES:
             continue
