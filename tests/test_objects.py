@@ -517,7 +517,7 @@ def test_what_makes_no_deck_is_refused_in_the_words_of_the_call(
         (lambda: fecm.Laminate("[0C]", {"C": "AS4/8525"}), "did you mean AS4/8552"),
         (lambda: fecm.Laminate([(0, "foam")], {"C": "AS4/8552"}), "the material 'foam'"),
         (lambda: fecm.Laminate([], METAL.ply, 1.0), r"\[\] is not a list of angles"),
-        (lambda: fecm.Laminate(["x"], METAL.ply, 1.0), "not a list of angles"),  # type: ignore[list-item]
+        (lambda: fecm.Laminate(["x"], METAL.ply, 1.0), "not a list of angles"),
         (lambda: fecm.Laminate("[0", METAL.ply, 1.0), "can't be read at its end"),
         (lambda: fecm.Laminate("[0]", (1, 2), 1.0), "not a name or a Ply"),  # type: ignore[arg-type]
         (lambda: fecm.Laminate("[0]", METAL.ply, -1.0), "`ply_thickness` is -1.0"),

@@ -68,6 +68,78 @@ def test_classes_of_the_api_that_hold_arrays_are_equal_only_to_themselves() -> N
     assert held > 10
 
 
+OBJECTS: dict[str, Callable[[], Any]] = {
+    "text": lambda: fecm.Laminate("[0/90]s", "T300/5208"),
+    "array": lambda: fecm.Laminate(np.array([0, 90, 90, 0]), "T300/5208", np.float64(0.125)),
+    "generator": lambda: fecm.Laminate((angle for angle in (0, 90)), "T300/5208"),
+    "tuples": lambda: fecm.Laminate([0, (90, "IM7/8552", 0.2)], "T300/5208"),
+    "dictionaries": lambda: fecm.Laminate("[0C/90C]", {"C": "T300/5208"}, {"C": 0.125}),
+    "plate": lambda: fecm.Plate.rectangle(tuple(np.array([100, 80])), (4, 4)),
+    "fixture": lambda: fecm.Plate.on_fixture("D7136"),
+    "contact": lambda: fecm.Contact(np.float64(2e6)),
+    "sphere": lambda: fecm.Contact.estimate(radius=8),
+    "named ply": lambda: fecm.materials()["T300/5208"],
+    "named contact": lambda: fecm.contacts()["report-0.5"],
+    "ply": lambda: fecm.Ply(1.6e-9, 0.3, 140e3, 9e3, 5e3, 5e3, 3e3),
+    "mass": lambda: fecm.RigidMass(1e-3),
+    "rod": lambda: fecm.Rod.cylinder(10.0, 0.5, 3e7, 7e-4),
+    "deck": lambda: fecm.read_one(DECK),
+}
+
+
+@pytest.mark.parametrize("kind", OBJECTS)
+def test_objects_of_a_deck_are_values(kind: str) -> None:
+    one, other = OBJECTS[kind](), OBJECTS[kind]()
+    copies = copy.copy(one), copy.deepcopy(one), pickle.loads(pickle.dumps(one))
+    for again in (other, *copies):
+        assert again == one
+        assert hash(again) == hash(one)
+    assert one != 0
+    assert len({one, other, *copies}) == 1
+
+
+def test_a_laminate_of_a_sequence_of_any_kind_is_the_laminate_of_its_angles() -> None:
+    angles = [0.0, 45.0, 90.0]
+    asked = fecm.Laminate(tuple(angles), "T300/5208")
+    held = np.array(angles)
+    laminate = fecm.Laminate(held, "T300/5208")
+    held[0] = 30.0
+    for other in (
+        laminate,
+        *(fecm.Laminate(kind, "T300/5208") for kind in (angles, range(0, 91, 45))),
+    ):
+        assert other == asked
+        assert repr(other).startswith("Laminate(layup=(0.0, 45.0, 90.0), ply=")
+    inner = fecm.Laminate([[0, "IM7/8552"], [90, "IM7/8552", 0.2]])  # as JSON has it
+    assert inner == fecm.Laminate([(0, "IM7/8552"), (90, "IM7/8552", 0.2)])
+    with pytest.raises(ValueError, match="`layup` has the angle nan"):
+        fecm.Laminate([float("nan")])
+
+
+def test_an_angle_with_a_unit_is_refused() -> None:
+    unit = pytest.importorskip("pint").UnitRegistry()
+    with pytest.raises(
+        ValueError, match="`layup` has the angle 45 degree; give a number of degrees"
+    ):
+        fecm.Laminate([unit.Quantity(45, "degree")])
+
+
+@pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
+def test_jobs_and_results_are_copied_hashed_and_printed_in_a_line() -> None:
+    sweep = fecm.Sweep(DECK, SPEEDS)
+    for again in (copy.deepcopy(sweep), pickle.loads(pickle.dumps(sweep))):
+        assert str(again) == str(sweep)
+    result = fecm.run_one(DECK)
+    held = [kind() for kind in MADE.values()]
+    held += [fecm.estimate(DECK), fecm.diff(result, result), fecm.plate_model(DECK)]
+    for one in held:
+        if not isinstance(one, dict):
+            assert isinstance(hash(one), int)
+            assert pickle.loads(pickle.dumps(one)) is not one
+    for one in (held[list(MADE).index("fit")], held[list(MADE).index("pulse")], held[-1]):
+        assert re.fullmatch(r"<fecm .{20,80}>", repr(one))
+
+
 def test_a_table_of_cases_keeps_the_index_of_the_caller() -> None:
     pandas = pytest.importorskip("pandas")
     tests = pandas.DataFrame({"name": ["A", "B", "C"], "velocity": [50.0, 75.0, 100.0]})

@@ -10,7 +10,6 @@ from contextlib import suppress
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -51,7 +50,7 @@ class TableOfCases(NamedTuple):
     """Cases, and the measured columns of their table by name."""
 
     cases: list[Case]
-    measured: Mapping[str, MeasuredColumn] = MappingProxyType({})
+    measured: Mapping[str, MeasuredColumn]
 
 
 def table_of_cases(
@@ -69,8 +68,8 @@ def table_of_cases(
         rows, measured = (cases, {}) if free else _without_measured(cases, system)
         return TableOfCases(checked(rows, free=free, system=system), measured)
     if texts := texts_of(vary):
-        return TableOfCases(grid_cases([parse_vary(text, system) for text in texts]))
-    return TableOfCases(combined(vary or {}, free=free, system=system))
+        return TableOfCases(grid_cases([parse_vary(text, system) for text in texts]), {})
+    return TableOfCases(combined(vary or {}, free=free, system=system), {})
 
 
 def texts_of(texts: object) -> list[str]:

@@ -38,6 +38,7 @@ from fecm.deck.model import (
     Ply,
     Segment,
 )
+from fecm.deck.quantities import text_of
 from fecm.deck.units import MODULUS, UnitsError, in_si, system_named, unit_of, units_of
 from fecm.mechanics.laminate import ROUNDING, EngineeringConstants
 from fecm.mechanics.laminate import LaminateSection as Stiffness
@@ -56,8 +57,8 @@ ENTRIES = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
 
 AnyPly = str | Ply | NamedPly
 # Angle, name of the material, and thickness of a ply. The laminate supplies missing parts.
-Entry = float | tuple[float, str] | tuple[float, str, float | str]
-Layup = str | Sequence[Entry]
+Entry = float | tuple[float, str] | tuple[float, str, float | str] | Sequence[float | str]
+Layup = str | Iterable[Entry]
 
 
 class LaminatePly(NamedTuple):
@@ -83,7 +84,7 @@ class Laminate:
         Layup as in ``"[0/45]2s"``, or angles in degrees, from the struck face on. With several
         materials, plies have a letter, ``"[0C/90G]s"``, or are tuples of angle, name and
         thickness, ``[(0, "C"), (0, "foam", 10.0)]``. Without a thickness a tuple takes
-        `ply_thickness`.
+        `ply_thickness`. The laminate keeps a list or an array as a tuple.
     ply : str or Ply or NamedPly or dict, optional
         Name of a ply from the list of `fecm materials`, or constants in the units of the deck. A
         dictionary has several materials by their names in the layup; ``""`` stands for plies
@@ -121,6 +122,8 @@ class Laminate:
     ply_thickness: float | str | Mapping[str, float | str] | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.layup, str):  # an array or a list of the caller may change
+            object.__setattr__(self, "layup", tuple(map(_short_entry, _parse_layup(self.layup))))
         plies = self.ply.values() if isinstance(self.ply, Mapping) else [self.ply]
         for constants in plies:
             if constants is not None:  # the laminate of a zone may take the material of the plate
@@ -134,18 +137,7 @@ class Laminate:
         """Plies from the struck face on."""
         if isinstance(self.layup, str):
             return tuple(LaminatePly(*ply) for ply in parse_plies(self.layup))
-        try:
-            plies = tuple(map(_parse_entry, self.layup))
-        except (TypeError, ValueError):
-            plies = ()
-        if not plies:
-            raise ObjectError(f"the layup {self.layup!r} is not a list of angles")
-        if wrong := [ply.angle for ply in plies if abs(ply.angle) > LARGEST_ANGLE]:
-            raise ObjectError(
-                f"`layup` has the angle {wrong[0]:g}, beyond ±{LARGEST_ANGLE:g}; angles are in "
-                "degrees"
-            )
-        return plies
+        return _parse_layup(self.layup)
 
     @property
     def angles(self) -> tuple[float, ...]:
@@ -248,13 +240,43 @@ class Laminate:
         return thickness
 
 
+def _parse_layup(layup: Iterable[Entry]) -> tuple[LaminatePly, ...]:
+    """Return the plies of a sequence of angles; raise ObjectError if it is not one."""
+    try:
+        plies = tuple(map(_parse_entry, layup))
+    except ObjectError:
+        raise
+    except (TypeError, ValueError):
+        plies = ()
+    if not plies:
+        raise ObjectError(f"the layup {layup!r} is not a list of angles")
+    if wrong := [ply.angle for ply in plies if not abs(ply.angle) <= LARGEST_ANGLE]:
+        raise ObjectError(
+            f"`layup` has the angle {wrong[0]:g}, beyond ±{LARGEST_ANGLE:g}; angles are in degrees"
+        )
+    return plies
+
+
+def _short_entry(ply: LaminatePly) -> Entry:
+    """Return a ply without the parts that the layup does not give."""
+    if ply.thickness is not None:
+        return ply.angle, ply.name, ply.thickness
+    return (ply.angle, ply.name) if ply.name else ply.angle
+
+
 def _parse_entry(entry: Entry) -> LaminatePly:
-    if not isinstance(entry, tuple):
-        return LaminatePly(float(entry))
+    if not isinstance(entry, Sequence) or isinstance(entry, str):
+        return LaminatePly(_angle(entry))
     angle, name, *thickness = entry
     if not isinstance(name, str):
         raise TypeError
-    return LaminatePly(float(angle), name, *thickness)
+    return LaminatePly(_angle(angle), name, *thickness)
+
+
+def _angle(value: float | str) -> float:
+    if text_of(value) is not value:  # float() of a quantity of pint is in radians
+        raise ObjectError(f"`layup` has the angle {value}; give a number of degrees without a unit")
+    return float(value)
 
 
 def _total(thicknesses: Sequence[float]) -> float:

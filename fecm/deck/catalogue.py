@@ -136,6 +136,9 @@ class NamedPly(NamedTuple):
     source: str = ""
     assumed: str = ""
 
+    def __hash__(self) -> int:
+        return hash((self.name, self.system, self.source))  # `values` is a dictionary
+
     @property
     def ply(self) -> Ply:
         """Elastic constants in their own units."""

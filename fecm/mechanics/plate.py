@@ -75,6 +75,10 @@ class PlateModel:
     laminate_numbers: Indices | None = None
     curvature: Curvature = FLAT  # 1/R_x, 1/R_y, 1/R_xy of a shallow panel, 1/length
 
+    def __repr__(self) -> str:
+        nodes, elements = len(self.mesh.coordinates), len(self.mesh.elements)
+        return f"<fecm plate model: {nodes} nodes, {elements} elements, {self.neq} equations>"
+
     @property
     def neq(self) -> int:
         """Number of equations, one for each free dof."""

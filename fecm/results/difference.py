@@ -260,7 +260,7 @@ class Listed(NamedTuple):
         return f"{printable(self.name)}{line}: {text_a} against {text_b}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Difference:
     """Outcome of :func:`fecm.diff`; ``str()`` is what ``fecm diff`` prints.
 

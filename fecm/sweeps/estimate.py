@@ -56,7 +56,7 @@ class ModelEstimate:
     applies: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Estimate:
     """Quick estimates of an impact beside its run; ``str()`` is the page of `fecm estimate`.
 

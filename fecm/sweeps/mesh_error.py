@@ -31,7 +31,7 @@ from fecm.sweeps.in_full import without_output
 from fecm.sweeps.task import Measure
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeshErrorEstimate:
     """Peak force and exposures on a mesh, and on one with bisected elements around the load.
 

@@ -14,7 +14,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fecm._version import __version__
@@ -37,7 +36,7 @@ if TYPE_CHECKING:
 
 BuildFunction = Callable[[dict[str, Any]], Deck]  # of a case, whose values are any
 MeasureFunction = Callable[[Result], Mapping[str, float]]
-NO_COLUMNS: Mapping[str, MeasuredColumn] = MappingProxyType({})
+NO_COLUMNS: Mapping[str, MeasuredColumn] = {}
 MOST_TOGETHER = 2048  # cases advanced together
 WORTH_WORKERS = 10.0  # seconds that tasks take, from which on workers are worth their start
 

@@ -116,6 +116,9 @@ class IndentationFit:
         plain = constants.plain(self.fit) | {"notes": list(self.notes)}
         return {"units": dict(self.units) or None, **plain}
 
+    def __repr__(self) -> str:
+        return f"<fecm fit of an indentation test of {len(self.force)} points>"
+
     def __str__(self) -> str:
         units = tuple(self.units.values())
         stated = (

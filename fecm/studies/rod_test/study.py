@@ -76,6 +76,9 @@ class PulseTest(RodHistory):
     filtered: Floats | None = None
     units: dict[str, str] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        return f"<fecm pulse test of a rod: {len(self.time)} rows, stations {self.stations}>"
+
     def __str__(self) -> str:
         size = f"length {self.rod.length:g}, mass {self.rod.total_mass:.5g}"
         lines = [
