@@ -112,7 +112,10 @@ def test_a_name_like_no_other_gets_no_hint_but_the_choices() -> None:
             "sweep d.inp --vary rod_",
             {f"rod_{n}=" for n in ("mass", "length", "modulus", "density")},
         ),
-        ("sweep d.inp --random velo", {"velocity="}),
+        ("sweep d.inp --vary velo", {"velocity=FROM:TO:N", "velocity=A,B,C"}),
+        ("sweep d.inp --vary velocity=", {"velocity=FROM:TO:N", "velocity=A,B,C"}),
+        ("sweep d.inp --random velo", {"velocity=normal:MEAN,SD", "velocity=uniform:A,B"}),
+        ("sweep d.inp --correlation mass,velo", {"mass,velocity"}),
         ("new --material IM", {"IM7/8552", "IM7/8551-7"}),
         ("identify d.inp m.csv --free mass,velo", {"mass,velocity"}),
         ("example imp", {"impact-patch.inp"}),
@@ -127,6 +130,18 @@ def test_the_shell_completes_values(
     completed = {line.partition(",")[2] for line in call().stdout.splitlines()}
     assert values <= completed
     assert all(value.startswith(words.split()[-1]) for value in completed)
+
+
+@pytest.mark.parametrize(
+    "words", ["--vary velocity=50", "--vary velocity=50,", "--random velocity=5", "--exceed velo"]
+)
+def test_the_shell_proposes_no_name_inside_or_in_place_of_a_value(
+    words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("_FECM_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", f"fecm sweep d.inp {words}")
+    monkeypatch.setenv("COMP_CWORD", "4")
+    assert call().stdout.strip() == ""
 
 
 @pytest.mark.parametrize("arguments", [("info",), ("plot",), ("tapes",), ("export", "--to", "csv")])

@@ -303,6 +303,17 @@ def test_several_runs_stand_side_by_side(failed: Result) -> None:
     assert found.pictures
 
 
+def test_columns_and_regions_of_a_page_have_names_of_their_own(failed: Result) -> None:
+    other = fecm.run_one(small())
+    found = {"peak force": failed, "plate": other}  # names of rows too
+    for results in (found, {"one": failed}):
+        html = render(page_of(results))
+        regions = re.findall(r'role="region" aria-label="([^"]*)"', html)
+        assert len(regions) > 3
+        assert len(set(regions)) == len(regions)
+        assert not re.search(r"<th[^>]*>\s*</th>", html)
+
+
 def test_results_in_different_units_have_no_common_pictures(failed: Result) -> None:
     other = fecm.run_one(small().replace("ROD", "UNIT\nin lbf s\nROD", 1))
     found = page(one=failed, other=other)

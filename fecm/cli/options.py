@@ -160,15 +160,20 @@ class Parsed(click.ParamType):  # type: ignore[type-arg]
     """Result of a parser of the text. Its ValueError is the message of the option.
 
     The form, as in ``X,Y``, is for help pages. The values are for the shell's completion of the
-    whole text, or of the part after the last comma of a list.
+    whole text, or of the part after the last comma of a list. A value ``NAME=`` is followed by one
+    of the `forms`, of which there are two or more.
     """
 
     name = "text"
 
     def __init__(
-        self, function: Callable[[Any], Any], form: str, values: Iterable[str] = ()
+        self,
+        function: Callable[[Any], Any],
+        form: str,
+        values: Iterable[str] = (),
+        forms: Sequence[str] = (),
     ) -> None:
-        self._function, self._form, self._values = function, form, values
+        self._function, self._form, self._values, self._forms = function, form, values, forms
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
         """Return the form of the value."""
@@ -188,11 +193,13 @@ class Parsed(click.ParamType):  # type: ignore[type-arg]
         from click.shell_completion import CompletionItem  # only for a shell
 
         done, comma, begun = incomplete.rpartition(",")
-        return [
-            CompletionItem(f"{done}{comma}{value}")
-            for value in self._values
-            if value.startswith(begun)
-        ]
+        if "=" in done:
+            return []
+        texts = [f"{done}{comma}{value}" for value in self._values if value.startswith(begun)]
+        if len(texts) == 1 and texts[0].endswith("="):
+            # After a single proposal the shell adds a blank; after two, only what they share.
+            texts = [f"{texts[0]}{form}" for form in self._forms]
+        return [CompletionItem(text) for text in texts]
 
 
 class OneOf(click.Choice):  # type: ignore[type-arg]

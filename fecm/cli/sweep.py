@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,7 @@ from fecm.cli.options import (
 from fecm.mechanics.own_law import LawError
 from fecm.simulation.job import ProblemRun
 from fecm.sweeps.convergence import convergence_lines
+from fecm.sweeps.distributions import FORMS
 from fecm.sweeps.execute import address_in
 from fecm.sweeps.job import Sweep
 from fecm.sweeps.reduced import MOST_MODES
@@ -44,7 +46,9 @@ from fecm.sweeps.search import parse_until
 from fecm.sweeps.summary import remarks, sweep_summary, sweep_verdict, tables
 from fecm.sweeps.task import MEASURES
 
-NAMED = [f"{name}=" for name in NAMES]  # for the shell's completion
+# For the shell's completion.
+NAMED = [f"{name}=" for name in NAMES]
+RANGES = ("FROM:TO:N", "A,B,C")
 
 # Headings of the help page, with options of the command itself.
 GROUPS: dict[str, list[str]] = {
@@ -56,9 +60,9 @@ GROUPS: dict[str, list[str]] = {
 }
 
 
-def _texts(form: str) -> dict[str, Any]:
+def _texts(form: str, values: Iterable[str] = (), forms: Sequence[str] = ()) -> dict[str, Any]:
     """Return the settings of an option that takes several texts, which the sweep parses."""
-    return {"type": Parsed(str, form, NAMED), "multiple": True}
+    return {"type": Parsed(str, form, values, forms), "multiple": True}
 
 
 @click.command(
@@ -75,11 +79,11 @@ def _texts(form: str) -> dict[str, Any]:
 @click.argument("deck", type=DECK_PATH)
 @job_options(
     Sweep,
-    vary=_texts("NAME=VALUES"),
+    vary=_texts("NAME=VALUES", NAMED, RANGES),
     cases={"type": DECK_PATH},
     refine={"type": list_of("FACTOR,...", click.IntRange(1, 8))},
-    random=_texts("NAME=LAW"),
-    correlation=_texts("NAME,NAME=RHO"),
+    random=_texts("NAME=LAW", NAMED, FORMS),
+    correlation=_texts("NAME,NAME=RHO", NAMES),
     samples={"type": int},
     exceed=_texts("QUANTITY=VALUE"),
     until={"type": Parsed(parse_until, "QUANTITY=VALUE")},

@@ -389,8 +389,8 @@ def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> It
         rows["result, SHA-256"] = [digests.get(name, "in memory") for name in results]
     yield from page_table(
         ((key, *cells) for key, cells in rows.items()),
-        ("", *results) if len(results) > 1 else (),
-        "" if len(results) > 1 else "Versions and checksums",
+        ("property", *results) if len(results) > 1 else (),
+        "Versions and checksums",
     )
     for name, text in texts.items():
         yield listing("The deck" if len(texts) == 1 else f"The deck of {name}", text)
