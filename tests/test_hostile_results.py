@@ -192,6 +192,12 @@ def foreign_mode(file: h5py.File) -> None:
     file["failure/hashin/mode"][...] = 100
 
 
+def longer_history(file: h5py.File) -> None:
+    for name, dataset in list(file["history"].items()):
+        del file["history"][name]
+        file["history"].create_dataset(name, (len(dataset) + 2,), dataset.dtype)
+
+
 def raw_version(file: h5py.File) -> None:
     file.attrs["format_version"] = "\n\x1b[31m"
 
@@ -205,6 +211,7 @@ def raw_version(file: h5py.File) -> None:
         (foreign_nodes, "export --to vtkhdf -o x.vtkhdf", "nodes outside 1 to 25"),
         (no_force, "info", "threshold has no attribute force"),
         (foreign_mode, "info", "failure/hashin/mode has the mode 100, which has no name"),
+        (longer_history, "info", "but rows is 10 in energy/"),
         (raw_version, "info", "format version \\n\\x1b[31m is not 1"),
     ],
 )

@@ -328,7 +328,8 @@ def first_misfit(
             return Misfit(path, f"{path} has the shape {shape}, not ({expected})")
         for name, size in zip(dataset.shape, shape, strict=True):
             origin = (name, "every result") if isinstance(name, int) else (size, path)
-            key = f"{dataset.group} {name}" if name == "rows" else name
+            group = schema.EVERY_STEP[0] if dataset.group in schema.EVERY_STEP else dataset.group
+            key = f"{group} {name}" if name == "rows" else name
             needed, source = known_sizes.setdefault(key, origin)
             if size != needed:
                 message = f"{path} has the shape {shape}, but {name} is {needed} in {source}"

@@ -102,6 +102,7 @@ class Dataset:
         return replace(self, shape=(self.outer, *self.shape))
 
 
+EVERY_STEP = ("energy", "history", "gages")  # groups with a row for every step
 # Groups: each column has its type, sizes, description and, if it has one, dimension.
 _Energy = Annotated[Floats, "rows"]
 _Strain = Annotated[Floats, "rows numel npt"]

@@ -26,6 +26,7 @@ from fecm.results.schema import (
     CONTACT,
     CURE_STRESS,
     DATASETS,
+    EVERY_STEP,
     FIXED,
     Dataset,
     criterion_datasets,
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from fecm.mechanics.failure_monitor import FailureMonitor
 
 
-EVERY_STEP = ("energy", "history", "gages")  # groups with a row for every step
 BLOCK = 1024  # steps that are gathered
 # Columns of a step that are known when it is taken.
 SCALARS = (
