@@ -118,9 +118,18 @@ def _check_each_segment(checked: Problem, findings: Findings, unsound: set[str])
     if (laminates := checked.deck.last(model.Laminates)) is not None:
         for numbered in laminates.laminates:
             apply(laminate.OF_LAYERS, findings, numbered)
-    of_materials = (*zones.OF_DECK, *damage.OF_MATERIALS)
-    if unsound.isdisjoint(zones.KEYWORDS) and apply(of_materials, findings, checked.deck):
-        apply(cure.OF_MATERIALS, findings, checked.deck)
+    if unsound.isdisjoint(zones.KEYWORDS):
+        _check_materials(checked.deck, findings)
+
+
+def _check_materials(deck: model.Deck, findings: Findings) -> None:
+    """Check that materials and laminates of all segments exist."""
+    before = findings.error_count
+    apply(zones.OF_DECK, findings, deck)
+    if (strengths := deck.last(model.Allowables)) is not None:
+        apply(damage.OF_MATERIALS, findings, deck, strengths)
+    if (card := deck.last(model.Cure)) is not None and findings.error_count == before:
+        apply(cure.OF_MATERIALS, findings, deck, card)
 
 
 def check_impact(checked: Problem, findings: Findings) -> None:
@@ -187,7 +196,7 @@ def _check_points(checked: Problem, findings: Findings) -> None:
         return
     if checked.deck.has(model.Nonlinear):
         apply(nonlinear.OF_NONLINEAR, findings, checked)
-    else:
+    elif has_assumed_shear(checked.deck):
         apply(quadrature.OF_ASSUMED_SHEAR, findings, checked)
     if is_curved(checked.deck):
         apply(curvature.OF_PANEL, findings, checked)
@@ -200,60 +209,94 @@ def _check_points(checked: Problem, findings: Findings) -> None:
 
 def _check_run(checked: Problem, findings: Findings, sound: Callable[[], bool]) -> None:
     """Check a problem whose segments and mesh are sound."""
-    apply(preload.OF_PRELOAD, findings, checked)
-    apply(damage.OF_THRESHOLD, findings, checked)
+    deck = checked.deck
+    if (force := deck.last(model.Preload)) is not None:
+        apply(preload.OF_PRELOAD, findings, checked, force)
+    if (delamination := deck.last(model.Delamination)) is not None:
+        apply(damage.OF_THRESHOLD, findings, checked, delamination)
     _check_time_step(checked, findings)
     check_program(checked, findings)
-    apply(program.OF_PURPOSE, findings, checked)
+    apply(program.WITH_IMPACT if checked.has_impact else program.WITHOUT_IMPACT, findings, checked)
     if sound():
         apply(mesh.OF_SUPPORTS, findings, checked)
-        if checked.deck.has(model.Nonlinear) or is_curved(checked.deck):
+        if deck.has(model.Nonlinear) or is_curved(deck):
             apply(nonlinear.OF_SYMMETRY, findings, checked)
-        if is_curved(checked.deck):
+        if is_curved(deck):
             apply(curvature.OF_SUPPORTS, findings, checked)
-        apply_first(preload.OF_BUCKLING, findings, checked)
+        if force is not None:
+            apply_first(preload.OF_BUCKLING, findings, checked, force)
         check_values(checked, findings)
         if time_step.takes_steps(checked):
             apply(time_step.OF_CONTACT, findings, checked)
     if checked.has_impact:
-        apply(projectile.WITHOUT_PROJECTILE, findings, checked)
+        if not deck.has(model.Projectile):
+            apply(projectile.WITHOUT_PROJECTILE, findings, checked)
         apply((*impact.OF_MESH, *symmetry.OF_IMPACT), findings, checked)
-        apply(gages.OF_POINT_FORCE, findings, checked)
+        if (segment := deck.last(model.Gages)) is not None and not deck.has(model.Patch):
+            apply(gages.OF_POINT_FORCE, findings, checked, segment)
 
 
 def _check_time_step(checked: Problem, findings: Findings) -> None:
     """Compare every DT with the plate's critical time step, and with the rate of the damping."""
     if not time_step.takes_steps(checked):
         return
-    apply((*time_step.OF_ROUNDING, *time_step.OF_TIME_STEP), findings, checked)
+    apply(time_step.OF_ROUNDING, findings, checked)
+    if (damping := checked.deck.last(model.Damping)) is not None:
+        apply(time_step.OF_RESOLUTION, findings, checked, damping)
     apply_first(time_step.OF_PLATE, findings, checked)
 
 
 def check_program(checked: Problem, findings: Findings) -> None:
     """Check the length of a program, and that its loops reach the steps that are stored."""
-    if apply(program.OF_LENGTH, findings, checked):
-        apply(program.OF_OUTPUT, findings, checked)
+    if not apply(program.OF_LENGTH, findings, checked):
+        return
+    apply(program.OF_OUTPUT, findings, checked)
+    if cards := program.macros_of(checked, "PLYS", "FAIL"):
+        apply(program.OF_STRESSES, findings, checked, cards)
+    if cards := program.macros_of(checked, "PLYS"):
+        apply(program.OF_PLY_STRESSES, findings, checked, cards)
+
+
+# Rules about a segment in its sound problem, in their order.
+VALUES_OF_SEGMENT: dict[type[model.Segment], Iterable[Callable[..., list[Finding]]]] = {
+    model.Shear: laminate.VALUES_OF_SHEAR,
+    model.Preload: (*preload.VALUES, *damage.OF_PRELOAD),
+    model.Allowables: damage.VALUES_OF_STRENGTHS,
+    model.Delamination: damage.VALUES_OF_DELAMINATION,
+    model.Cure: cure.VALUES,
+    model.Gages: gages.VALUES,
+}
 
 
 def check_values(checked: Problem, findings: Findings) -> None:
     """Warn about valid values of a sound problem that look like mistakes."""
-    apply((*laminate.VALUES, *zones.VALUES, *damage.OF_LAYERS), findings, checked)
-    apply(units.VALUES, findings, checked)
-    apply(preload.VALUES, findings, checked)
-    if is_curved(checked.deck):
+    deck = checked.deck
+    apply((*laminate.VALUES, *zones.VALUES, *units.VALUES), findings, checked)
+    for kind, rules in VALUES_OF_SEGMENT.items():
+        if (segment := deck.last(kind)) is not None:
+            apply(rules, findings, checked, segment)
+    if is_curved(deck):
         apply(curvature.VALUES, findings, checked)
+    if (damping := deck.last(model.Damping)) is not None:
+        apply_first(time_step.VALUES_OF_DAMPING, findings, checked, damping)
+    if (strengths := deck.last(model.Allowables)) is not None:
+        apply_first(damage.STRENGTHS, findings, checked, strengths)
+    if strengths is not None or deck.has(model.Delamination):
+        apply(damage.OF_LAYUP, findings, checked)
+    if cards := program.macros_of(checked, "FAIL"):
+        apply(damage.OF_EVALUATIONS, findings, checked, cards)
     if checked.has_impact:
-        apply(contact.VALUES, findings, checked)
-        apply(impact.NEIGHBOURS, findings, checked)
-        apply(projectile.VALUES, findings, checked)
-        apply(impact.VALUES, findings, checked)
-    apply_first(time_step.VALUES, findings, checked)
-    apply_first(damage.STRENGTHS, findings, checked)
-    apply(damage.VALUES, findings, checked)
-    apply(cure.VALUES, findings, checked)
-    apply(gages.VALUES, findings, checked)
-    if checked.has_impact:
-        apply((*contact.OF_COEFFICIENT, *patch.VALUES), findings, checked)
+        _check_values_of_impact(checked, findings)
+
+
+def _check_values_of_impact(checked: Problem, findings: Findings) -> None:
+    """Warn about values of contact, projectile and patch that look like mistakes."""
+    apply((*contact.VALUES, *impact.NEIGHBOURS, *projectile.VALUES), findings, checked)
+    if (card := checked.deck.last(model.Projectile)) is not None:
+        apply(projectile.OF_ROD, findings, checked, card)
+    apply((*impact.VALUES, *contact.OF_COEFFICIENT), findings, checked)
+    if (segment := checked.deck.last(model.Patch)) is not None:
+        apply(patch.VALUES, findings, checked, segment)
 
 
 def check_listing(checked: Problem, findings: Findings) -> None:

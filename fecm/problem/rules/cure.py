@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from fecm._typing import Floats
@@ -72,15 +74,14 @@ def implausible_expansion(card: model.Cure) -> Reports:
 
 
 @rule("W496", Subject.LAMINATE)
-def implausible_moisture(problem: Problem) -> Reports:
+def implausible_moisture(problem: Problem, card: model.Cure) -> Reports:
     """A coefficient of moisture expansion on CURE is above 0.1.
 
     It is the strain per per cent of weight. Books have the strain at 100 %.
 
     Remedy: A hundredth of the book's value: 0.006 for 0.6.
     """
-    card = problem.deck.last(model.Cure)
-    for expansion in () if card is None else card.expansions:
+    for expansion in card.expansions:
         for name in expansion.MOISTURE:
             value = getattr(expansion, name)
             if abs(value) > LARGEST_BETA:
@@ -90,20 +91,19 @@ def implausible_moisture(problem: Problem) -> Reports:
 
 
 @rule("W462", Subject.LAMINATE)
-def large_change(problem: Problem) -> Reports:
+def large_change(problem: Problem, card: model.Cure) -> Reports:
     """The change of temperature on CURE is above 500 K.
 
     Remedy: Temperature of use minus stress-free temperature, in kelvin.
     """
-    card = problem.deck.last(model.Cure)
-    if card is not None and abs(card.delta_t) > LARGEST_CHANGE:
+    if abs(card.delta_t) > LARGEST_CHANGE:
         message = f"The change of temperature is {card.delta_t:g} K, above {LARGEST_CHANGE:g}."
         hint = "it is the temperature of use minus the stress-free temperature: -155 from 177 to 22"
         yield Report(message, card.place("change of temperature"), hint)
 
 
 @rule("W588", Subject.LAMINATE)
-def temperature_in_kelvin(problem: Problem) -> Reports:
+def temperature_in_kelvin(problem: Problem, card: model.Cure) -> Reports:
     """CURE cools the plies by 320 to 500 K.
 
     The stress-free temperature may be in kelvin and the temperature of use in degrees Celsius.
@@ -111,8 +111,7 @@ def temperature_in_kelvin(problem: Problem) -> Reports:
 
     Remedy: Both temperatures in degrees Celsius: -155 from 177 to 22.
     """
-    card = problem.deck.last(model.Cure)
-    if card is not None and -LARGEST_CHANGE <= card.delta_t <= -IN_KELVIN:
+    if -LARGEST_CHANGE <= card.delta_t <= -IN_KELVIN:
         message = (
             f"CURE cools the plies by {-card.delta_t:g} K, more than epoxy does: the stress-free "
             "temperature may be in kelvin."
@@ -125,7 +124,7 @@ def temperature_in_kelvin(problem: Problem) -> Reports:
 
 
 @rule("W540", Subject.LAMINATE)
-def heated_since_the_cure(problem: Problem) -> Reports:
+def heated_since_the_cure(problem: Problem, card: model.Cure) -> Reports:
     """The change of temperature on CURE is positive.
 
     The plies have been heated since they were free of stress. After a cure the change is negative,
@@ -133,8 +132,7 @@ def heated_since_the_cure(problem: Problem) -> Reports:
 
     Remedy: The temperature of use minus the temperature of the cure: -155 from 177 to 22.
     """
-    card = problem.deck.last(model.Cure)
-    if card is not None and card.delta_t > 0.0:
+    if card.delta_t > 0.0:
         message = (
             f"CURE {card.delta_t:+g} K: the plies have been heated since they were free of stress; "
             "after a cure the change is negative."
@@ -144,15 +142,15 @@ def heated_since_the_cure(problem: Problem) -> Reports:
 
 
 @rule("W463", Subject.DAMAGE)
-def cracks_at_rest(problem: Problem) -> Reports:
+def cracks_at_rest(problem: Problem, card: model.Cure) -> Reports:
     """The laminate cracks before any load.
 
     The residual stresses of CURE alone reach the strength of a ply.
 
     Remedy: The values of CURE and ALLO, or another layup.
     """
-    card, worst = problem.deck.last(model.Cure), problem.worst_under(preload=False)
-    if card is not None and worst is not None and worst[0].exposure >= 1.0:
+    worst = problem.worst_under(preload=False)
+    if worst is not None and worst[0].exposure >= 1.0:
         exposure, laminate = worst
         where = exposed(problem.deck, laminate, exposure)
         message = (
@@ -167,14 +165,14 @@ def cracks_at_rest(problem: Problem) -> Reports:
 
 
 @rule("W551", Subject.LAMINATE)
-def exchanged_expansions(problem: Problem) -> Reports:
+def exchanged_expansions(problem: Problem, card: model.Cure) -> Reports:
     """A ply of parallel fibres expands more along the fibres than across them.
 
     alpha1 is above alpha2, or beta1 above beta2, in a ply with E1 > 2 E2.
 
     Remedy: alpha1, along the fibres, before alpha2.
     """
-    for expansion in _expansions_of_fibrous_plies(problem):
+    for expansion in _expansions_of_fibrous_plies(card, problem.deck.plies):
         for along, across in (expansion.THERMAL, expansion.MOISTURE):
             first, second = getattr(expansion, along), getattr(expansion, across)
             if first > second:
@@ -187,32 +185,32 @@ def exchanged_expansions(problem: Problem) -> Reports:
 
 
 @rule("W552", Subject.LAMINATE)
-def expansion_per_fahrenheit(problem: Problem) -> Reports:
+def expansion_per_fahrenheit(problem: Problem, card: model.Cure) -> Reports:
     """alpha2 on CURE looks like a coefficient per degree Fahrenheit.
 
     It is 8·10⁻⁶ to 18·10⁻⁶ in a ply with E1 > 2 E2; resins have 19·10⁻⁶ and more.
 
     Remedy: Coefficients per kelvin: 1.8 times those per degree Fahrenheit.
     """
-    for card in _expansions_of_fibrous_plies(problem):
-        least, greatest = PER_FAHRENHEIT
-        if card.alpha1 <= card.alpha2 and least < card.alpha2 < greatest:
+    least, greatest = PER_FAHRENHEIT
+    for expansion in _expansions_of_fibrous_plies(card, problem.deck.plies):
+        if expansion.alpha1 <= expansion.alpha2 and least < expansion.alpha2 < greatest:
             message = (
-                f"alpha2 = {card.alpha2:g} is small for a resin and looks like a coefficient per "
-                "degree Fahrenheit; CURE takes coefficients per kelvin."
+                f"alpha2 = {expansion.alpha2:g} is small for a resin and looks like a coefficient "
+                "per degree Fahrenheit; CURE takes coefficients per kelvin."
             )
-            converted = f"{1.8 * card.alpha1:.4g} and {1.8 * card.alpha2:.4g}"
+            converted = f"{1.8 * expansion.alpha1:.4g} and {1.8 * expansion.alpha2:.4g}"
             hint = f"per kelvin alpha1 and alpha2 would be {converted}"
-            yield Report(message, card.place("alpha2"), hint)
+            yield Report(message, expansion.place("alpha2"), hint)
 
 
-def _expansions_of_fibrous_plies(problem: Problem) -> list[model.Expansion]:
-    """Yield the coefficients of expansion of the plies with parallel fibres."""
-    card, plies = problem.deck.last(model.Cure), problem.deck.plies
-    expansions = () if card is None else card.expansions
+def _expansions_of_fibrous_plies(
+    card: model.Cure, plies: Mapping[int, model.Ply]
+) -> list[model.Expansion]:
+    """Return the coefficients of expansion of the plies with parallel fibres."""
     return [
         expansion
-        for expansion in expansions
+        for expansion in card.expansions
         if (ply := plies.get(expansion.material)) is not None and ply.e1 > FIBROUS * ply.e2
     ]
 
@@ -224,7 +222,7 @@ def _largest_curvature(curvature: Floats) -> float:
 
 
 @rule("W464", Subject.LAMINATE)
-def warped_plate(problem: Problem) -> Reports:
+def warped_plate(problem: Problem, card: model.Cure) -> Reports:
     """The laminate is not symmetric and warps as it cools.
 
     The free plate rises by more than a tenth of its thickness. It is taken as flat when it is
@@ -232,8 +230,7 @@ def warped_plate(problem: Problem) -> Reports:
 
     Remedy: A symmetric laminate, or accept it.
     """
-    card, residual = problem.deck.last(model.Cure), problem.residual
-    if card is None or residual is None:
+    if (residual := problem.residual) is None:
         return
     rise = _largest_curvature(residual.curvature) * problem.longer_side**2 / 8.0
     thickness = problem.laminate.thickness
@@ -248,23 +245,22 @@ def warped_plate(problem: Problem) -> Reports:
 
 
 @rule("W465", Subject.LAMINATE)
-def cure_without_stresses(problem: Problem) -> Reports:
+def cure_without_stresses(problem: Problem, card: model.Cure) -> Reports:
     """CURE is given without PLYS and FAIL.
 
     Residual stresses change neither the motion nor the force.
 
     Remedy: FAIL, with ALLO, in the loop of RODP.
     """
-    card = problem.deck.last(model.Cure)
-    if card is not None and {"PLYS", "FAIL"}.isdisjoint(m.word for m in flat(problem.program)):
+    if {"PLYS", "FAIL"}.isdisjoint(m.word for m in flat(problem.program)):
         message = "CURE has no effect without PLYS or FAIL: motion and force don't depend on it."
         yield Report(message, card.place(), "put FAIL, with ALLO, into the loop of RODP")
 
 
 @reports("E453")
-def missing_expansions(deck: model.Deck) -> Reports:
+def missing_expansions(deck: model.Deck, card: model.Cure) -> Reports:
     """Find materials of layers without coefficients of expansion, and unknown ones with them."""
-    if (card := deck.last(model.Cure)) is None or not deck.has(model.Material):
+    if not deck.has(model.Material):
         return
     numbers = material_numbers(deck)
     for expansion in card.expansions:

@@ -112,27 +112,24 @@ def invalid_delamination(card: model.Delamination) -> Reports:
 
 
 @rule("W458", Subject.DAMAGE)
-def coupled_threshold(problem: Problem) -> Reports:
+def coupled_threshold(problem: Problem, card: model.Delamination) -> Reports:
     """B is not zero: the threshold takes D - B A⁻¹ B for D.
 
     Remedy: A symmetric laminate, or accept it.
     """
-    delamination = problem.deck.last(model.Delamination)
-    if delamination is not None and problem.laminate.is_coupled:
+    if problem.laminate.is_coupled:
         message = "B is not zero: the delamination threshold takes D - B A^-1 B for D."
-        yield Report(message, delamination.place())
+        yield Report(message, card.place())
 
 
 @rule("W461", Subject.DAMAGE)
-def twisted_threshold(problem: Problem) -> Reports:
+def twisted_threshold(problem: Problem, card: model.Delamination) -> Reports:
     """Bending twists the plate.
 
     D16 or D26 is more than a tenth of √(D11 D22). The threshold is computed for an isotropic plate.
 
     Remedy: An estimate; a test of this layup is better.
     """
-    if (delamination := problem.deck.last(model.Delamination)) is None:
-        return
     D = problem.laminate.D
     twist = float(np.abs(D[:2, 2]).max() / np.sqrt(D[0, 0] * D[1, 1]))
     if twist > MOST_TWIST:
@@ -141,11 +138,11 @@ def twisted_threshold(problem: Problem) -> Reports:
             "is computed for an isotropic plate with the mean stiffness D*."
         )
         hint = "threshold and D* do not depend on the axes; how delaminations grow does"
-        yield Report(message, delamination.place(), hint)
+        yield Report(message, card.place(), hint)
 
 
 @rule("W467", Subject.DAMAGE)
-def strengths_in_another_unit(problem: Problem) -> Reports:
+def strengths_in_another_unit(problem: Problem, card: model.Allowables) -> Reports:
     """A strength does not suit the modulus in its direction.
 
     It is below 5·10⁻⁵ or above 0.3 of the modulus. The finding names the unit that it seems to be
@@ -153,16 +150,19 @@ def strengths_in_another_unit(problem: Problem) -> Reports:
 
     Remedy: Strengths in the moduli's unit.
     """
-    for card, ply in _strengths(problem):
-        yield from _strengths_in_another_unit(card, ply, unit_names(problem.deck))
+    for strengths, ply in _strengths(problem, card):
+        yield from _strengths_in_another_unit(strengths, ply, unit_names(problem.deck))
 
 
-def _strengths(problem: Problem) -> list[tuple[model.Allowables, model.Ply]]:
-    """Yield the strengths and constants of the materials that have both."""
-    card, plies = problem.deck.last(model.Allowables), problem.deck.plies
-    cards = () if card is None else (card, *card.others)
+def _strengths(
+    problem: Problem, card: model.Allowables
+) -> list[tuple[model.Allowables, model.Ply]]:
+    """Return the strengths and constants of the materials that have both."""
+    plies = problem.deck.plies
     return [
-        (strengths, plies[strengths.material]) for strengths in cards if strengths.material in plies
+        (strengths, plies[strengths.material])
+        for strengths in (card, *card.others)
+        if strengths.material in plies
     ]
 
 
@@ -199,7 +199,7 @@ def _strengths_in_another_unit(
 
 
 @rule("W468", Subject.DAMAGE)
-def strengths_in_another_order(problem: Problem) -> Reports:
+def strengths_in_another_order(problem: Problem, card: model.Allowables) -> Reports:
     """YT or XC is above XT, YC above XC, or YC below YT in a ply with E1 > 2 E2.
 
     The finding names the order that the values seem to be in. In plies of boron fibres XC may be
@@ -207,8 +207,8 @@ def strengths_in_another_order(problem: Problem) -> Reports:
 
     Remedy: XT, XC, YT, YC, S12, S13, S23.
     """
-    for card, ply in _strengths(problem):
-        yield from _strengths_in_another_order(card, ply)
+    for strengths, ply in _strengths(problem, card):
+        yield from _strengths_in_another_order(strengths, ply)
 
 
 def _strengths_in_another_order(card: model.Allowables, ply: model.Ply) -> Reports:
@@ -242,7 +242,7 @@ def _faults(strengths: Sequence[float], ply: model.Ply) -> dict[str, str]:
 
 
 @rule("W553", Subject.DAMAGE)
-def weak_in_shear(problem: Problem) -> Reports:
+def weak_in_shear(problem: Problem, card: model.Allowables) -> Reports:
     """A shear strength is below a quarter of YT in a ply with E1 > 2 E2.
 
     The finding names the unit that the value seems to be in.
@@ -250,25 +250,25 @@ def weak_in_shear(problem: Problem) -> Reports:
     Remedy: S12, S13 and S23 in the unit of the other strengths.
     """
     names = unit_names(problem.deck)
-    for card, ply in _strengths(problem):
-        if ply.e1 <= FIBROUS * ply.e2 or card.yt > ENDLESS * ply.e2:
+    for strengths, ply in _strengths(problem, card):
+        if ply.e1 <= FIBROUS * ply.e2 or strengths.yt > ENDLESS * ply.e2:
             continue
-        shear = {"S12": card.s12, "S13": card.s13, "S23": card.s23}
-        weak = {name: s for name, s in shear.items() if s < WEAKEST_SHEAR * card.yt}
+        shear = {"S12": strengths.s12, "S13": strengths.s13, "S23": strengths.s23}
+        weak = {name: s for name, s in shear.items() if s < WEAKEST_SHEAR * strengths.yt}
         if not weak:
             continue
         first, value = next(iter(weak.items()))
         too = f" ({' and '.join([*weak][1:])} too)" if len(weak) > 1 else ""
-        message = f"{first} = {value:g} is below a quarter of YT = {card.yt:g}{too}"
-        factor = in_si(MODULUS, names)
-        if factor is not None and (looks := looks_like(value, MODULUS, card.yt * factor, names)):
+        message = f"{first} = {value:g} is below a quarter of YT = {strengths.yt:g}{too}"
+        size = in_si(MODULUS, names)
+        if size is not None and (looks := looks_like(value, MODULUS, strengths.yt * size, names)):
             message += f": it {looks}"
         hint = "no ply of parallel fibres is so weak in shear; all strengths have one unit"
-        yield Report(f"{message}.", card.place(first), hint)
+        yield Report(f"{message}.", strengths.place(first), hint)
 
 
 @rule("W469", Subject.DAMAGE)
-def doubtful_toughness(problem: Problem) -> Reports:
+def doubtful_toughness(problem: Problem, card: model.Delamination) -> Reports:
     """No laminate has this G_IIc.
 
     It is outside 150 to 4000 J/m² if E1 > 2 E2, and otherwise outside 50 to 5000 J/m² (without
@@ -277,8 +277,6 @@ def doubtful_toughness(problem: Problem) -> Reports:
     Remedy: N/mm is 1000 J/m², lbf/in 175 J/m².
     """
     deck, names = problem.deck, unit_names(problem.deck)
-    if (card := deck.last(model.Delamination)) is None:
-        return
     place, value = card.place("G_IIc"), card.toughness
     factor = in_si(TOUGHNESS, names)
     if factor is not None:
@@ -306,14 +304,13 @@ def doubtful_toughness(problem: Problem) -> Reports:
 
 
 @rule("W470", Subject.DAMAGE)
-def too_many_delaminations(problem: Problem) -> Reports:
+def too_many_delaminations(problem: Problem, card: model.Delamination) -> Reports:
     """There are more delaminations than interfaces.
 
     Remedy: A blank is one.
     """
-    card = problem.deck.last(model.Delamination)
     plies = len(problem.laminate.plies.angles)
-    if card is not None and card.number > max(1, plies - 1):
+    if card.number > max(1, plies - 1):
         interfaces = f"{plies} layers have {plies - 1} interfaces"
         message = f"DELA has {card.number:g} delaminations, but {interfaces}."
         place = card.place("number of delaminations")
@@ -321,21 +318,20 @@ def too_many_delaminations(problem: Problem) -> Reports:
 
 
 @rule("W471", Subject.DAMAGE)
-def strengths_without_criteria(problem: Problem) -> Reports:
+def strengths_without_criteria(problem: Problem, card: model.Allowables) -> Reports:
     """ALLO is given without FAIL.
 
     No exposure is computed.
 
     Remedy: FAIL in the loop of RODP.
     """
-    card = problem.deck.last(model.Allowables)
-    if card is not None and all(macro.word != "FAIL" for macro in flat(problem.program)):
+    if all(macro.word != "FAIL" for macro in flat(problem.program)):
         message = "ALLO has strengths, but the program has no FAIL: no exposure is computed."
         yield Report(message, card.place(), "put FAIL into the loop of RODP")
 
 
 @rule("W472", Subject.DAMAGE)
-def few_evaluations(problem: Problem) -> Reports:
+def few_evaluations(problem: Problem, cards: list[model.Macro]) -> Reports:
     """FAIL is evaluated at too few times of an impact.
 
     It is outside the loop of RODP, or evaluated less than 20 times at an interval above 1: the
@@ -343,9 +339,8 @@ def few_evaluations(problem: Problem) -> Reports:
 
     Remedy: FAIL in the loop, a smaller N.
     """
-    cards = [macro for macro in flat(problem.program) if macro.word == "FAIL"]
     count = problem.work.passes["FAIL"]
-    if not cards or not problem.has_impact or count == 0:  # W510 reports it
+    if not problem.has_impact or count == 0:  # W510 reports it
         return
     loops = [item for item in problem.program if isinstance(item, Loop)]
     stepping = [loop for loop in loops if "RODP" in {macro.word for macro in flat(loop.body)}]
@@ -366,15 +361,15 @@ def few_evaluations(problem: Problem) -> Reports:
 
 
 @rule("W489", Subject.DAMAGE)
-def preload_beyond_strength(problem: Problem) -> Reports:
+def preload_beyond_strength(problem: Problem, card: model.Preload) -> Reports:
     """The preload alone fails a ply.
 
     A criterion of FAIL is at 1 or above under PREL, before anything moves.
 
     Remedy: A smaller preload; the units of PREL, force/length, and of ALLO.
     """
-    card, worst = problem.deck.last(model.Preload), problem.worst_under(cure=False)
-    if card is not None and worst is not None and worst[0].exposure >= 1.0:
+    worst = problem.worst_under(cure=False)
+    if worst is not None and worst[0].exposure >= 1.0:
         exposure, laminate = worst
         where = exposed(problem.deck, laminate, exposure)
         message = f"The preload alone reaches exposure {exposure.exposure:.3g} ({where})."
@@ -382,7 +377,7 @@ def preload_beyond_strength(problem: Problem) -> Reports:
 
 
 @rule("W541", Subject.DAMAGE)
-def threshold_of_a_sandwich(problem: Problem) -> Reports:
+def threshold_of_a_sandwich(problem: Problem, card: model.Delamination) -> Reports:
     """DELA has no effect: the plate is a sandwich.
 
     The threshold holds for a solid laminate. The faces of a sandwich delaminate, or leave the
@@ -390,8 +385,7 @@ def threshold_of_a_sandwich(problem: Problem) -> Reports:
 
     Remedy: Remove DELA; FAIL has the exposures of faces and core.
     """
-    card = problem.deck.last(model.Delamination)
-    if card is not None and problem.laminate.has_core:
+    if problem.laminate.has_core:
         message = (
             "The plate has a core: the threshold of DELA holds for a solid laminate and is not "
             "computed. The faces delaminate, or leave the core, far below it."
@@ -400,7 +394,7 @@ def threshold_of_a_sandwich(problem: Problem) -> Reports:
 
 
 @rule("N559", Subject.DAMAGE)
-def puck_of_a_fabric(problem: Problem) -> Reports:
+def puck_of_a_fabric(problem: Problem, card: model.Allowables) -> Reports:
     """FAIL leaves out Puck's criterion for the plies of a fabric.
 
     The criterion holds for unidirectional plies. A ply is a fabric if E2 is near E1, and G12 far
@@ -408,34 +402,34 @@ def puck_of_a_fabric(problem: Problem) -> Reports:
 
     Remedy: The other criteria are evaluated; none of them is made for fabrics either.
     """
-    for card, ply in _strengths(problem):
+    for strengths, ply in _strengths(problem, card):
         if is_fabric(ply):
             message = (
                 f"The ply is a fabric (E2/E1 = {ply.e2 / ply.e1:.2g}, G12/E2 = "
                 f"{ply.g12 / ply.e2:.2g}): Puck's criterion, of unidirectional plies, is left out."
             )
             hint = "judge it by the other criteria, and by tests of the fabric"
-            yield Report(message, card.place(), hint)
+            yield Report(message, strengths.place(), hint)
 
 
 @rule("N560", Subject.DAMAGE)
-def limited_slope(problem: Problem) -> Reports:
+def limited_slope(problem: Problem, card: model.Allowables) -> Reports:
     """Puck's slope p+ is above S12/YT, and is taken as S12/YT.
 
     With a larger slope the exposure at YT would not be 1.
 
     Remedy: Check YT and S12, or give p+ on the second card of ALLO.
     """
-    for card, ply in _strengths(problem):
-        is_endless = card.yt > ENDLESS * ply.e2
-        slope = puck_slope(ply_strengths(card, ply))
-        if is_fabric(ply) or is_endless or slope == card.p_plus:
+    for strengths, ply in _strengths(problem, card):
+        is_endless = strengths.yt > ENDLESS * ply.e2
+        slope = puck_slope(ply_strengths(strengths, ply))
+        if is_fabric(ply) or is_endless or slope == strengths.p_plus:
             continue
         message = (
-            f"Puck's slope p+ = {card.p_plus:g} is above S12/YT = {slope:.3g}, which is taken "
+            f"Puck's slope p+ = {strengths.p_plus:g} is above S12/YT = {slope:.3g}, which is taken "
             "instead: the exposure at YT must be 1."
         )
-        yield Report(message, card.place(), "check YT and S12")
+        yield Report(message, strengths.place(), "check YT and S12")
 
 
 @rule("N589", Subject.DAMAGE)
@@ -447,15 +441,13 @@ def cluster_at_far_face(problem: Problem) -> Reports:
 
     Remedy: Quote the lowest criterion of FAIL beside the threshold.
     """
-    deck = problem.deck
-    judges = deck.has(model.Delamination) or deck.has(model.Allowables)
-    layers = list(deck.layers.values())[problem.laminate_number]
+    layers = list(problem.deck.layers.values())[problem.laminate_number]
     last, count = layers[-1], 0
     for layer in reversed(layers):
         if (layer.angle, layer.material) != (last.angle, last.material):
             break
         count += 1
-    if judges and CLUSTER <= count < len(layers):
+    if CLUSTER <= count < len(layers):
         message = (
             f"{count} like plies lie together at the far face: they crack in bending, and their "
             "interface opens, before the threshold of DELA."
@@ -465,25 +457,24 @@ def cluster_at_far_face(problem: Problem) -> Reports:
 
 
 @reports("E497")
-def strengths_of_missing_material(deck: model.Deck) -> Reports:
+def strengths_of_missing_material(deck: model.Deck, card: model.Allowables) -> Reports:
     """Find materials of ALLO that the deck does not have."""
-    if (card := deck.last(model.Allowables)) is not None:
-        numbers = material_numbers(deck)
-        for strengths in (card, *card.others):
-            if strengths.material not in numbers:
-                yield unknown_material(strengths.material, numbers, strengths.place("material"))
+    numbers = material_numbers(deck)
+    for strengths in (card, *card.others):
+        if strengths.material not in numbers:
+            yield unknown_material(strengths.material, numbers, strengths.place("material"))
 
 
 @rule("W498", Subject.DAMAGE)
-def layers_without_strengths(problem: Problem) -> Reports:
+def layers_without_strengths(problem: Problem, card: model.Allowables) -> Reports:
     """FAIL has no strengths of some layers.
 
     The exposures of these layers and of the interfaces beside them are not known (NaN).
 
     Remedy: A pair of cards on ALLO for their material.
     """
-    deck, card = problem.deck, problem.deck.last(model.Allowables)
-    if card is None or all(macro.word != "FAIL" for macro in flat(problem.program)):
+    deck = problem.deck
+    if all(macro.word != "FAIL" for macro in flat(problem.program)):
         return
     for n, (number, layers) in enumerate(deck.layers.items()):
         if n not in problem.used_laminates:
@@ -501,20 +492,18 @@ def layers_without_strengths(problem: Problem) -> Reports:
 
 
 OF_MATERIALS = (strengths_of_missing_material,)
-OF_LAYERS = (layers_without_strengths,)
 OF_STRENGTHS = (invalid_strength, invalid_constant_of_criterion)
 OF_DELAMINATION = (invalid_delamination,)
 OF_THRESHOLD = (coupled_threshold, twisted_threshold)
+OF_EVALUATIONS = (few_evaluations,)
+OF_PRELOAD = (preload_beyond_strength,)
+OF_LAYUP = (cluster_at_far_face,)
 # One of these is enough.
 STRENGTHS = (strengths_in_another_unit, strengths_in_another_order, weak_in_shear)
-VALUES = (
-    cluster_at_far_face,
-    threshold_of_a_sandwich,
+VALUES_OF_STRENGTHS = (
+    layers_without_strengths,
     strengths_without_criteria,
     puck_of_a_fabric,
     limited_slope,
-    few_evaluations,
-    preload_beyond_strength,
-    doubtful_toughness,
-    too_many_delaminations,
 )
+VALUES_OF_DELAMINATION = (threshold_of_a_sandwich, doubtful_toughness, too_many_delaminations)

@@ -73,16 +73,13 @@ def gage_outside_laminate(problem: Problem) -> Reports:
 
 
 @rule("W452", Subject.POINTS)
-def gage_under_force(problem: Problem) -> Reports:
+def gage_under_force(problem: Problem, segment: model.Gages) -> Reports:
     """A gage is nearer than the thickness to the impact node.
 
     Strains under a point force depend on the mesh.
 
     Remedy: Another place, or PATC.
     """
-    segment = problem.deck.last(model.Gages)
-    if segment is None or problem.deck.has(model.Patch):
-        return
     x, y = problem.mesh.coordinates[problem.deck.require(model.Impact).node - 1]
     for record in segment.records:
         distance = float(np.hypot(record.x - x, record.y - y))
@@ -97,16 +94,13 @@ def gage_under_force(problem: Problem) -> Reports:
 
 
 @rule("W477", Subject.POINTS)
-def shallow_gage(problem: Problem) -> Reports:
+def shallow_gage(problem: Problem, segment: model.Gages) -> Reports:
     """A gage is almost in the mid-plane.
 
     It is nearer than h/100, but not in it.
 
     Remedy: z in the deck's unit of length.
     """
-    segment = problem.deck.last(model.Gages)
-    if segment is None:
-        return
     thickness, names = problem.laminate.thickness, unit_names(problem.deck)
     shallow = [r for r in segment.records if 0.0 < abs(r.z) < SHALLOW * thickness]
     if not shallow:
@@ -125,14 +119,11 @@ def shallow_gage(problem: Problem) -> Reports:
 
 
 @rule("W478", Subject.POINTS)
-def directions_in_radians(problem: Problem) -> Reports:
+def directions_in_radians(problem: Problem, segment: model.Gages) -> Reports:
     """The directions of all gages are multiples of 5° in radians.
 
     Remedy: Degrees.
     """
-    segment = problem.deck.last(model.Gages)
-    if segment is None:
-        return
     turned = [record for record in segment.records if record.direction]
     if turned and are_like_radians([record.direction for record in turned]):
         first = turned[0]

@@ -338,13 +338,12 @@ def exchanged_shear_moduli(problem: Problem) -> Reports:
 
 
 @rule("W586", Subject.POINTS)
-def small_factor(problem: Problem) -> Reports:
+def small_factor(problem: Problem, card: model.Shear) -> Reports:
     """The shear correction factor of a solid laminate is below 0.5.
 
     Remedy: 5/6 for one material, 0.6 to 0.9 for laminates; `SHEA EQUI` computes it.
     """
-    card = problem.deck.last(model.Shear)
-    if card is not None and card.factor < LEAST_FACTOR and not problem.laminate.has_core:
+    if card.factor < LEAST_FACTOR and not problem.laminate.has_core:
         message = f"The shear correction factor is {card.factor:g}, below {LEAST_FACTOR:g}."
         hint = "laminates have 0.6 to 0.9, one material 5/6; SHEA EQUI needs no factor"
         yield Report(message, card.place(FIELD), hint)
@@ -513,7 +512,6 @@ VALUES = (
     moduli_with_lost_digit,
     doubtful_shear_modulus,
     exchanged_shear_moduli,
-    small_factor,
     thin_core,
     large_angle,
     shares_as_angles,
@@ -563,4 +561,5 @@ def factor_with_equilibrium(segment: model.Shear) -> Reports:
         yield Report(message, segment.place(FIELD), hint)
 
 
+VALUES_OF_SHEAR = (small_factor,)
 OF_SHEAR = (invalid_factor, large_factor, factor_with_equilibrium)

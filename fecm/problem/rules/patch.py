@@ -161,15 +161,14 @@ def _longest_side(mesh: MeshArrays, rows: Indices | Bools) -> float:
 
 
 @rule("W474", Subject.POINTS)
-def blank_radius(problem: Problem) -> Reports:
+def blank_radius(problem: Problem, card: model.Patch) -> Reports:
     """PATC with commas has a blank radius.
 
     The values after it are centre and static load.
 
     Remedy: `DISC,1.,50.,50.`: columns 5–10 need no field of their own.
     """
-    card = problem.deck.last(model.Patch)
-    if card is None or card.radius is not None or card.x is None or card.y is None:
+    if card.radius is not None or card.x is None or card.y is None:
         return
     if not card.load or card.source is None or "," not in card.source.card.data:
         return
@@ -189,7 +188,7 @@ def blank_radius(problem: Problem) -> Reports:
 
 
 @rule("N473", Subject.POINTS)
-def patch_away_from_node(problem: Problem) -> Reports:
+def patch_away_from_node(problem: Problem, card: model.Patch) -> Reports:
     """The patch is away from ROD's node.
 
     The distance is above its radius and the sides of the elements there. The force acts on the
@@ -208,17 +207,16 @@ def patch_away_from_node(problem: Problem) -> Reports:
             f"the contact force acts on the patch at ({patch.x:g}, {patch.y:g}), {distance:.3g} "
             f"from node {impact.node} of ROD at ({x:g}, {y:g}), whose place is not used"
         )
-        place = problem.deck.require(model.Patch).place("centre x0")
-        yield Report(message, place, "leave x0 and y0 blank for the node of ROD")
+        yield Report(message, card.place("centre x0"), "leave x0 and y0 blank for the node of ROD")
 
 
-def _large_patch(problem: Problem, limit: float) -> str:
+def _large_patch(problem: Problem, card: model.Patch, limit: float) -> str:
     """Describe a patch with a radius above a limit and far above that of the contact.
 
     The text is empty for other patches.
     """
-    card, thickness = problem.deck.last(model.Patch), problem.laminate.thickness
-    if card is None or card.radius is None or card.radius <= limit:
+    thickness = problem.laminate.thickness
+    if card.radius is None or card.radius <= limit:
         return ""
     law = problem.deck.require(model.Indentation)
     with np.errstate(all="ignore"):
@@ -242,7 +240,7 @@ def _radius_hint(card: model.Patch) -> str:
 
 
 @rule("W475", Subject.POINTS)
-def large_patch(problem: Problem) -> Reports:
+def large_patch(problem: Problem, card: model.Patch) -> Reports:
     """The radius of the patch looks like the radius of the indenter.
 
     It is more than twice the radius of the contact, and more than twice the thickness or half the
@@ -251,8 +249,7 @@ def large_patch(problem: Problem) -> Reports:
     Remedy: The radius of the contact, or blank for 0.327 h.
     """
     limit = min(LARGE * problem.laminate.thickness, INDENTER * sphere_radius(problem))
-    if _judges_stresses(problem) and (what := _large_patch(problem, limit)):
-        card = problem.deck.require(model.Patch)
+    if _judges_stresses(problem) and (what := _large_patch(problem, card, limit)):
         message = (
             f"The {what}. It looks like the radius of the indenter: stresses and exposures under "
             "the load would be too small."
@@ -261,7 +258,7 @@ def large_patch(problem: Problem) -> Reports:
 
 
 @rule("N475", Subject.POINTS)
-def large_patch_without_stresses(problem: Problem) -> Reports:
+def large_patch_without_stresses(problem: Problem, card: model.Patch) -> Reports:
     """The radius of the patch is large, but only the force depends on it.
 
     The program has neither FAIL nor PLYS. The radius is more than twice the radius of the contact
@@ -270,8 +267,7 @@ def large_patch_without_stresses(problem: Problem) -> Reports:
     Remedy: The radius of the contact, or blank for 0.327 h.
     """
     limit = LARGE * problem.laminate.thickness
-    if not _judges_stresses(problem) and (what := _large_patch(problem, limit)):
-        card = problem.deck.require(model.Patch)
+    if not _judges_stresses(problem) and (what := _large_patch(problem, card, limit)):
         yield Report(f"the {what}", card.place("radius c"), _radius_hint(card))
 
 

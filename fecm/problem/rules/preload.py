@@ -33,7 +33,7 @@ def no_preload(card: model.Preload) -> Reports:
 
 
 @rule("E483", Subject.LAMINATE)
-def preload_of_coupled_laminate(problem: Problem) -> Reports:
+def preload_of_coupled_laminate(problem: Problem, card: model.Preload) -> Reports:
     """PREL is used with a laminate whose B is not zero.
 
     Such a laminate bends under a force in its plane.
@@ -41,21 +41,18 @@ def preload_of_coupled_laminate(problem: Problem) -> Reports:
     Remedy: A static solution under that force before the impact, with `NONL`. The projectile then
     starts on the bent plate.
     """
-    card = problem.deck.last(model.Preload)
-    if card is not None and any(card.forces) and problem.plate.is_coupled:
+    if any(card.forces) and problem.plate.is_coupled:
         message = "B is not zero: the plate bends under the force of PREL, and is not flat."
         hint = "preload it by a static solution before the impact, with NONL: FORC, TANG to CONV"
         yield Report(message, card.place(), hint)
 
 
 @rule("W484", Subject.LAMINATE)
-def large_preload(problem: Problem) -> Reports:
+def large_preload(problem: Problem, card: model.Preload) -> Reports:
     """The preload of PREL strains the plate by more than 1 %.
 
     Remedy: The unit of force over length: N/mm in mm and N.
     """
-    if (card := problem.deck.last(model.Preload)) is None:
-        return
     largest = float(np.abs(problem.plate.preload_strain).max())
     if largest > LARGEST_STRAIN:
         factor = in_si(FORCE, unit_names(problem.deck))
@@ -89,15 +86,14 @@ def small_preload(problem: Problem) -> Reports:
 
 
 @rule("E499", Subject.LAMINATE)
-def preload_of_unlike_laminates(problem: Problem) -> Reports:
+def preload_of_unlike_laminates(problem: Problem, card: model.Preload) -> Reports:
     """PREL is used with laminates of different stiffness.
 
     Their strains under the same force differ: the forces in such a plate are not uniform.
 
     Remedy: A static solution under that force before the impact, with `NONL`.
     """
-    card = problem.deck.last(model.Preload)
-    if card is None or not any(card.forces):
+    if not any(card.forces):
         return
     first, *other_stiffnesses = (problem.plate.laminates[n].A for n in problem.used_laminates)
     if any(np.abs(A - first).max() > ROUNDING * np.abs(first).max() for A in other_stiffnesses):
@@ -107,15 +103,14 @@ def preload_of_unlike_laminates(problem: Problem) -> Reports:
 
 
 @rule("W557", Subject.LAMINATE)
-def preload_around_hole(problem: Problem) -> Reports:
+def preload_around_hole(problem: Problem, card: model.Preload) -> Reports:
     """PREL is used with a plate that has a hole.
 
     PREL is uniform over the plate; around a hole the force in the plane is not.
 
     Remedy: A static solution under that force before the impact, with `NONL`.
     """
-    card = problem.deck.last(model.Preload)
-    if card is None or not any(card.forces) or not (count := holes(problem.mesh)) > 0:
+    if not any(card.forces) or not (count := holes(problem.mesh)) > 0:
         return
     has = "a hole" if count == 1 else f"{count} holes"
     message = f"The plate has {has}: a force in the plane is not uniform, but PREL is."
@@ -149,31 +144,28 @@ FEWEST_ELEMENTS = 2.0
 
 
 @rule("E486", Subject.LAMINATE)
-def compressed_free_plate(problem: Problem) -> Reports:
+def compressed_free_plate(problem: Problem, card: model.Preload) -> Reports:
     """PREL compresses a plate that its supports let move along w.
 
     It has no buckling load, and its edge loads may or may not keep their direction.
 
     Remedy: Restrain w at the edges, or a preload in tension.
     """
-    card = problem.deck.last(model.Preload)
-    if card is None or not problem.plate.is_compressed:
-        return
-    if rigid_deflections(problem.mesh).size:
+    if problem.plate.is_compressed and rigid_deflections(problem.mesh).size:
         message = "PREL compresses a plate that its supports let move along w."
         yield Report(message, card.place(), "restrain w at every node of a supported edge")
 
 
 @rule("E487", Subject.LAMINATE)
-def buckled(problem: Problem) -> Reports:
+def buckled(problem: Problem, card: model.Preload) -> Reports:
     """The preload is at or beyond the buckling load.
 
     The flat plate is not stable: its deflection would grow without bound.
 
     Remedy: A smaller compression; the units of PREL, force/length.
     """
-    card, factor = problem.deck.last(model.Preload), problem.buckling_factor
-    if card is None or not factor <= 1.0:
+    factor = problem.buckling_factor
+    if not factor <= 1.0:
         return
     message = (
         f"The preload N0 is {1.0 / factor:.3g} times the buckling load" if factor else STIFFLESS
@@ -183,15 +175,15 @@ def buckled(problem: Problem) -> Reports:
 
 
 @rule("W488", Subject.LAMINATE)
-def nearly_buckled(problem: Problem) -> Reports:
+def nearly_buckled(problem: Problem, card: model.Preload) -> Reports:
     """The preload is above 1/1.1 of the buckling load.
 
     Stiffness and frequencies depend on a small difference.
 
     Remedy: A finer mesh and exact loads and supports, or a smaller compression.
     """
-    card, factor = problem.deck.last(model.Preload), problem.buckling_factor
-    if card is None or not 1.0 < factor < NEAR:
+    factor = problem.buckling_factor
+    if not 1.0 < factor < NEAR:
         return
     message = f"The preload N0 is {1.0 / factor:.3g} times the buckling load"
     why = "stiffness and frequencies depend on a small difference"
@@ -199,7 +191,7 @@ def nearly_buckled(problem: Problem) -> Reports:
 
 
 @rule("W561", Subject.LAMINATE)
-def coarse_for_buckles(problem: Problem) -> Reports:
+def coarse_for_buckles(problem: Problem, card: model.Preload) -> Reports:
     """The elements are too large for the buckles of a curved panel.
 
     A buckle is about 1.73 (R h)^(1/2) long. With less than two elements along it the buckling load
@@ -207,8 +199,8 @@ def coarse_for_buckles(problem: Problem) -> Reports:
 
     Remedy: A finer mesh. `fecm check` prints the buckling load, here with `at most`.
     """
-    card, count = problem.deck.last(model.Preload), problem.elements_per_buckle
-    if card is None or not problem.plate.is_compressed or count >= FEWEST_ELEMENTS:
+    count = problem.elements_per_buckle
+    if not problem.plate.is_compressed or count >= FEWEST_ELEMENTS:
         return
     message = (
         f"The panel has {count:.2g} elements along a buckle: its buckling load is at most "

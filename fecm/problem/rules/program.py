@@ -64,43 +64,42 @@ def idle_program(problem: Problem) -> Reports:
         yield Report("The program takes no step and stores nothing.", place)
 
 
-def _cards(problem: Problem, *words: str) -> list[Macro]:
+def macros_of(problem: Problem, *words: str) -> list[Macro]:
+    """Return the macros of a program that have one of some words."""
     return [macro for macro in flat(problem.program) if macro.word in words]
 
 
 @rule("W449", Subject.POINTS)
-def ply_stresses_under_point_force(problem: Problem) -> Reports:
+def ply_stresses_under_point_force(problem: Problem, cards: list[Macro]) -> Reports:
     """Ply stresses under a point force grow without limit.
 
     They depend on the mesh: the finer it is, the larger they are.
 
     Remedy: PATC.
     """
-    cards = _cards(problem, "PLYS", "FAIL")
-    if cards and problem.has_impact and problem.patch is None:
+    if problem.has_impact and problem.patch is None:
         message = "Ply stresses under a point force grow without bound as the mesh is refined."
         hint = "a PATC segment gives the contact force an area"
         yield Report(message, cards[0].place("macro"), hint)
 
 
 @rule("W450", Subject.POINTS)
-def no_interlaminar_stresses(problem: Problem) -> Reports:
+def no_interlaminar_stresses(problem: Problem, cards: list[Macro]) -> Reports:
     """Elements without nine nodes have no interlaminar stresses.
 
     They are NaN.
 
     Remedy: 9-node quadrilaterals.
     """
-    cards = _cards(problem, "PLYS", "FAIL")
     incomplete = np.flatnonzero(~is_complete(problem.mesh.elements))
-    if cards and len(incomplete):
+    if len(incomplete):
         what = f"Interlaminar stresses of {len(incomplete)} elements without nine nodes"
         message = f"{what} are not computed (element {incomplete[0] + 1} first): they are NaN."
         yield Report(message, cards[0].place("macro"))
 
 
 @rule("E448", Subject.POINTS)
-def wrong_number_of_elements(problem: Problem) -> Reports:
+def wrong_number_of_elements(problem: Problem, cards: list[Macro]) -> Reports:
     """The number of elements of PLYS can't be taken.
 
     There are fewer elements, several cards have different numbers, or the nearest ones are asked
@@ -108,7 +107,7 @@ def wrong_number_of_elements(problem: Problem) -> Reports:
 
     Remedy: 0 or a blank takes all.
     """
-    cards, numel = _cards(problem, "PLYS"), problem.deck.control.numel
+    numel = problem.deck.control.numel
     for card in cards:
         if card.second > numel:
             message = f"PLYS takes {card.second:g} elements; the deck has {numel}."
@@ -116,7 +115,7 @@ def wrong_number_of_elements(problem: Problem) -> Reports:
         elif card.second != cards[0].second:
             message = "The PLYS cards take different numbers of elements."
             yield Report(message, card.place("second value"), "give each the same number")
-    if cards and cards[0].second and not problem.has_impact and problem.patch is None:
+    if cards[0].second and not problem.has_impact and problem.patch is None:
         message = "PLYS takes the elements nearest to the load, but nothing hits the plate."
         hint = "leave the number blank for all elements"
         yield Report(message, cards[0].place("second value"), hint)
@@ -138,7 +137,7 @@ def large_result(problem: Problem) -> Reports:
         f"The result will take {problem.output_bytes / 1e9:.3g} GB, {share / 1e9:.3g} GB of "
         f"them for {word}."
     )
-    storing = next(iter(_cards(problem, word)), None)
+    storing = next(iter(macros_of(problem, word)), None)
     hint = f"{word} stores every N steps: take a larger N"
     if word == "PLYS":
         hint += ", or only the M elements nearest to the load: PLYS,,N,M"
@@ -152,8 +151,6 @@ def _movers(problem: Problem) -> set[str]:
 
 def _unused_segment(problem: Problem) -> model.Segment | None:
     """Return the first segment of an impact in a deck whose program has no RODP."""
-    if "RODP" in _movers(problem):
-        return None
     segments = (problem.deck.last(kind) for kind in OF_AN_IMPACT)
     return next((segment for segment in segments if segment is not None), None)
 
@@ -208,10 +205,9 @@ def projectile_stands_still(problem: Problem) -> Reports:
 
     Remedy: RODP only.
     """
-    if {"RODP", "EXCD"} <= _movers(problem):
-        last = [macro for macro in problem.deck.macros if macro.word == "EXCD"][-1]
+    if steps := macros_of(problem, "EXCD"):
         message = "EXCD moves the plate but not the projectile, which is at rest during the step."
-        yield Report(message, last.place("macro"), "RODP applies the loads of FORC too")
+        yield Report(message, steps[-1].place("macro"), "RODP applies the loads of FORC too")
 
 
 # State after a word, by the state before it: 0 before impact steps, 1 after an impact step, 2 after
@@ -251,17 +247,8 @@ def static_solution_in_impact(problem: Problem) -> Reports:
 
 
 OF_LENGTH = (endless_program,)
-OF_OUTPUT = (
-    nothing_stored,
-    idle_program,
-    ply_stresses_under_point_force,
-    no_interlaminar_stresses,
-    wrong_number_of_elements,
-    large_result,
-)
-OF_PURPOSE = (
-    plate_at_rest,
-    nothing_hits,
-    projectile_stands_still,
-    static_solution_in_impact,
-)
+OF_OUTPUT = (nothing_stored, idle_program, large_result)
+OF_STRESSES = (ply_stresses_under_point_force, no_interlaminar_stresses)
+OF_PLY_STRESSES = (wrong_number_of_elements,)
+WITH_IMPACT = (projectile_stands_still, static_solution_in_impact)
+WITHOUT_IMPACT = (plate_at_rest, nothing_hits)

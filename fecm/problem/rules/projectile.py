@@ -169,15 +169,14 @@ def _report_of_mass(problem: Problem, ratio: float) -> Report:
 
 
 @rule("W439", Subject.IMPACT)
-def doubtful_rod(problem: Problem) -> Reports:
+def doubtful_rod(problem: Problem, card: model.Projectile) -> Reports:
     """The wave speed in the rod does not suit the wave speed along the fibres.
 
     Their ratio is outside 1/30 to 30.
 
     Remedy: Modulus and density in the ply's units.
     """
-    card, rod = problem.deck.last(model.Projectile), rod_of_deck(problem.deck)
-    if card is None or rod is None:
+    if (rod := rod_of_deck(problem.deck)) is None:
         return
     ply = problem.deck.require(model.Material).ply
     speed = math.sqrt(rod.modulus / rod.density)
@@ -190,15 +189,14 @@ def doubtful_rod(problem: Problem) -> Reports:
 
 
 @rule("W554", Subject.IMPACT)
-def rod_thicker_than_long(problem: Problem) -> Reports:
+def rod_thicker_than_long(problem: Problem, card: model.Projectile) -> Reports:
     """The rod is thicker than long.
 
     Its largest diameter is above its length. Waves run along a slender rod only.
 
     Remedy: The length on PROJ's card, the diameters on the cards below; or a rigid mass.
     """
-    card, rod = problem.deck.last(model.Projectile), rod_of_deck(problem.deck)
-    if card is None or rod is None:
+    if (rod := rod_of_deck(problem.deck)) is None:
         return
     thickest = max(rod.diameters)
     if thickest > rod.length:
@@ -235,10 +233,6 @@ def large_energy(problem: Problem) -> Reports:
         yield Report(message, impact.place("impact velocity"), hint)
 
 
-def _takes_the_reports_rod(problem: Problem) -> bool:
-    return not problem.deck.has(model.Projectile)
-
-
 def _has_the_reports_units(names: dict[str, str]) -> bool:
     """Return whether units fit the report's rod; True where they are unknown."""
     return not names or [in_si(name, names) for name in names] == REPORT_UNITS
@@ -252,7 +246,7 @@ def reports_rod(problem: Problem) -> Reports:
 
     Remedy: Give PROJ for another projectile.
     """
-    if _takes_the_reports_rod(problem) and _has_the_reports_units(unit_names(problem.deck)):
+    if _has_the_reports_units(unit_names(problem.deck)):
         place = problem.deck.require(model.Impact).place("impact node")
         yield Report("no PROJ: the report's steel rod (in, lbf, s) is taken", place)
 
@@ -265,7 +259,7 @@ def reports_rod_in_other_units(problem: Problem) -> Reports:
 
     Remedy: Give PROJ.
     """
-    if not _takes_the_reports_rod(problem) or _has_the_reports_units(unit_names(problem.deck)):
+    if _has_the_reports_units(unit_names(problem.deck)):
         return
     rod = report_rod()
     message = (
@@ -281,5 +275,6 @@ OF_NUMBER = (invalid_number_of_elements,)
 OF_PROJECTILE = (invalid_projectile, unknown_transducer)
 # Of diameters without other errors; one of these is enough.
 OF_DIAMETERS = (invalid_diameter, rod_out_of_range)
-VALUES = (doubtful_mass, heavy_projectile, doubtful_rod, rod_thicker_than_long, large_energy)
+OF_ROD = (doubtful_rod, rod_thicker_than_long)
+VALUES = (doubtful_mass, heavy_projectile, large_energy)
 WITHOUT_PROJECTILE = (reports_rod, reports_rod_in_other_units)

@@ -15,7 +15,6 @@ from fecm.mechanics import strains as assumed_shear
 from fecm.mechanics.elements import CUBIC, TRIANGLE
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.mesh import ElementBlock, distinct
-from fecm.problem.parts import has_assumed_shear
 from fecm.problem.problem import Problem
 from fecm.problem.rules.cards import describe_elements, report_elements
 
@@ -233,8 +232,6 @@ def elements_without_assumed_shear(problem: Problem) -> Reports:
 
     Remedy: Take other elements, or SHEA without MITC.
     """
-    if not has_assumed_shear(problem.deck):
-        return
     wrong = np.zeros(len(problem.mesh.elements), dtype=bool)
     for family in problem.families:
         wrong[family.rows] = not assumed_shear.uses_assumed_shear(family)

@@ -56,8 +56,6 @@ def no_critical_step(problem: Problem) -> Reports:
 
     Remedy: Check the units of constants, thickness and coordinates.
     """
-    if not takes_steps(problem):
-        return
     try:
         if _needs_critical_step(problem):
             _ = problem.critical_time_step
@@ -73,8 +71,7 @@ def step_lost_by_rounding(problem: Problem) -> Reports:
 
     Remedy: The unit of time; `DT 0` takes 0.9 of the critical step.
     """
-    safe = known_safe_step(problem)
-    if safe is None or not takes_steps(problem):
+    if (safe := known_safe_step(problem)) is None:
         return
     for macro in deck_time_steps(problem):
         if 0.0 < macro.value < LEAST_STEP * safe:
@@ -92,7 +89,7 @@ def unstable_step(problem: Problem) -> Reports:
 
     Remedy: A smaller DT, or `DT 0`. `--force` runs it.
     """
-    if not takes_steps(problem) or not _needs_critical_step(problem):
+    if not _needs_critical_step(problem):
         return
     critical = problem.critical_time_step
     for macro in deck_time_steps(problem):
@@ -168,15 +165,14 @@ def negative_damping(card: model.Damping) -> Reports:
 
 
 @rule("W460", Subject.DAMAGE)
-def badly_resolved_damping(problem: Problem) -> Reports:
+def badly_resolved_damping(problem: Problem, card: model.Damping) -> Reports:
     """The rate of damping is off by more than 1 %.
 
     Its error is (a DT)²/12.
 
     Remedy: The unit of time, or a smaller DT.
     """
-    card, safe = problem.deck.last(model.Damping), known_safe_step(problem)
-    if card is None or safe is None or not takes_steps(problem):
+    if (safe := known_safe_step(problem)) is None:
         return
     dt = max(macro.value or safe for macro in deck_time_steps(problem))
     if (error := (card.coefficient * dt) ** 2 / 12.0) > WORST_RATE:
@@ -199,7 +195,7 @@ def _damping_hint(problem: Problem) -> str:
 
 
 @rule("W479", Subject.DAMAGE)
-def damping_without_effect(problem: Problem) -> Reports:
+def damping_without_effect(problem: Problem, card: model.Damping) -> Reports:
     """DAMP is without effect.
 
     a times the simulated time is below 0.01, or a of at most 10 is below 2·10⁻⁴ of critical
@@ -207,8 +203,6 @@ def damping_without_effect(problem: Problem) -> Reports:
 
     Remedy: a in 1/time, 2 ζ ω for the damping ratio ζ of a mode.
     """
-    if (card := problem.deck.last(model.Damping)) is None:
-        return
     a = card.coefficient
     loss, duration = _loss_within_program(problem)
     if 0.0 < loss < WITHOUT_EFFECT:
@@ -229,15 +223,13 @@ def damping_without_effect(problem: Problem) -> Reports:
 
 
 @rule("W480", Subject.DAMAGE)
-def overdamped(problem: Problem) -> Reports:
+def overdamped(problem: Problem, card: model.Damping) -> Reports:
     """DAMP is so large that no low mode oscillates.
 
     a/2 is above the lowest natural frequency with clamped edges.
 
     Remedy: a in 1/time, 2 ζ ω.
     """
-    if (card := problem.deck.last(model.Damping)) is None:
-        return
     lowest = clamped_frequency(problem)
     if card.coefficient / 2.0 > lowest:
         message = (
@@ -266,6 +258,6 @@ def clamped_frequency(problem: Problem) -> float:
 
 
 OF_DAMPING = (negative_damping,)
-OF_TIME_STEP = (badly_resolved_damping,)
+OF_RESOLUTION = (badly_resolved_damping,)
 # One of these is enough.
-VALUES = (damping_without_effect, overdamped)
+VALUES_OF_DAMPING = (damping_without_effect, overdamped)
