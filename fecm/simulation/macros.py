@@ -110,7 +110,7 @@ def _passes_to_test(run: Simulation, over: Macro) -> int:
 def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
     """Run passes of a loop with RODP in one call of the kernels.
 
-    Passes end before OVER, the last macro of the loop, where OVER looks at the impact.
+    They end before OVER where it looks at the impact. The macros after OVER follow singly.
     """
     state, plate, steps = run.state, run.state.plate, run.model.steps
     impact, recorder = state.impact, run.recorder
@@ -121,8 +121,9 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
     if impact.start_w != 0.0:  # the kernels have a projectile that starts at 0
         return False
     count = min(run.interpreter.passes_to_come, run.interval - plate.step % run.interval)
-    over = macros[-1] if macros[-1].word == "OVER" else None
-    until_test = math.inf if over is None else _passes_to_test(run, over)
+    words = [macro.word for macro in macros]
+    over = words.index("OVER") if "OVER" in words else len(words)
+    until_test = _passes_to_test(run, macros[over]) if over < len(words) else math.inf
     count = int(min(count, until_test))
     later = np.arange(count)
     passes, numbers = run.interpreter.current_pass + later, plate.step + 1 + later
@@ -131,6 +132,9 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
         for macro in macros
         if macro.word not in ("TIME", "OVER")
     }
+    if count == until_test:
+        for word in words[over + 1 :]:
+            due[word][-1] = False
     (stored,) = np.nonzero(np.logical_or.reduce(list(due.values())))
     most = max(1, FIELDS // run.problem.mesh.equations.size)
     if len(stored) > most:
@@ -148,7 +152,7 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
             at_steps = states.columns["step"][stored[chosen]].astype(int).tolist()
             STORING[word](run, at_steps, states.columns["time"][stored[chosen]].tolist(), fields)
     if count == until_test:
-        run.interpreter.skip(count - 1, item=len(macros) - 1)
+        run.interpreter.skip(count - 1, item=over)
     else:
         run.interpreter.skip(count)
     run.observe()
@@ -346,8 +350,9 @@ def bind_loop(run: Simulation, body: Body) -> Passes | None:
     if words.count("RODP") != 1 or len(set(words)) < len(words):
         return None
     first = words.index("RODP")
-    later = words[first + 1 : -1] if words[-1] == "OVER" else words[first + 1 :]
-    if {*words[:first]} <= {"TIME"} and {*later} <= {"TIME", *AT_PASSES}:
+    over = words.index("OVER") if "OVER" in words else len(words)
+    before, after, after_over = words[:first], words[first + 1 : over], words[over + 1 :]
+    if {*before} <= {"TIME"} and {*after} <= {"TIME", *AT_PASSES} and {*after_over} <= {*AT_PASSES}:
         return partial(impact_steps, run, macros)
     return None
 
