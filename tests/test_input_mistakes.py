@@ -340,7 +340,9 @@ def test_the_distance_between_supports_of_a_round_window_is_its_diameter() -> No
     values = {**vars(problem.mesh), "coordinates": places, "codes": codes, "elements": elements}
     fields = MeshArrays.__dataclass_fields__
     mesh = MeshArrays(**{name: values[name] for name in fields})
-    assert unsupported(mesh, (1.0, 2.0))[0] == pytest.approx(2.0 * (6.0 - 0.2), rel=0.05)
+    assert unsupported(mesh, (1.0, 2.0), mesh.coordinates)[0] == pytest.approx(
+        2.0 * (6.0 - 0.2), rel=0.05
+    )
 
 
 def test_the_frequency_of_a_clamped_square_is_that_of_the_tables() -> None:

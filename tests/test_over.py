@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -81,7 +81,7 @@ ORDERS = ("DISP FAIL PLYS OVER", "OVER DISP FAIL PLYS", "FAIL OVER PLYS DISP", "
 @pytest.mark.parametrize("solver", ["kernels", "numpy"])
 @pytest.mark.parametrize("words", ORDERS)
 def test_a_loop_that_ends_early_stores_what_a_loop_of_its_passes_stores(
-    words: str, solver: str, tmp_path: Path
+    words: str, solver: Literal["kernels", "numpy"], tmp_path: Path
 ) -> None:
     deck = with_rows(words, 4000)
     run = fecm.run_one(deck, solver=solver)

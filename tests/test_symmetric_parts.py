@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -19,8 +19,9 @@ from fecm.problem.generate import generate
 from fecm.results import largest_exposures
 from fecm.studies import StudyError
 from tests.calls import call
-from tests.symmetric_parts import part_of, whole_deck
+from tests.symmetric_parts import mesh_of, part_of, whole_deck, window_deck, with_segments
 from tests.test_nonlinear_cards import with_codes
+from tests.test_several_materials import laminates
 
 PLATES: dict[str, dict[str, Any]] = {
     "linear": {"giic": 0.05},
@@ -83,6 +84,86 @@ def test_the_metrics_of_a_part_are_those_of_the_whole_plate(plate: str, part: st
     exposures = [exposure.exposure for exposure in largest_exposures(result)]
     expected = [exposure.exposure for exposure in largest_exposures(whole)]
     assert exposures == pytest.approx(expected, rel=1e-9)
+
+
+def with_pad(deck: fecm.Deck) -> fecm.Deck:
+    """The plate with 1 mm more under the load, in four elements."""
+    layers = ((0.0, 0.5, 1), (90.0, 0.5, 1), (90.0, 1.0, 1), (0.0, 0.5, 1), (0.0, 0.5, 1))
+    pad = model.Zones(tuple(model.Zone(number, 0, 0, 2) for number in (15, 16, 21, 22)))
+    return with_segments(deck, laminates(layers), pad)
+
+
+def sandwich() -> fecm.Deck:
+    """A plate of two faces and a thick core, of two materials."""
+    face, core = "IM7/8552", "E-glass/MY750"
+    plies = [(0, "C", 0.25), (90, "C", 0.25), (0, "G", 6.0), (90, "C", 0.25), (0, "C", 0.25)]
+    return whole_deck(laminate=fecm.Laminate(plies, {"C": face, "G": core}), duration=3e-4)
+
+
+def for_listing() -> fecm.Deck:
+    """A plate that the printed program can compute."""
+    deck = whole_deck(damage=False, duration=3e-4)
+    segments = tuple(one for one in deck.segments if not isinstance(one, model.Shear))
+    return replace(deck, segments=segments, text="")
+
+
+OTHER_PLATES: dict[str, tuple[Callable[[], fecm.Deck], Literal["report", "listing"]]] = {
+    "sandwich": (sandwich, "report"),
+    "zones": (lambda: with_pad(whole_deck(duration=3e-4)), "report"),
+    "zones on a window": (lambda: with_pad(window_deck()), "report"),
+    "window": (window_deck, "report"),
+    "triangles": (lambda: whole_deck(plate=mesh_of(3), duration=3e-4), "report"),
+    "four nodes": (lambda: whole_deck(plate=mesh_of(4), duration=3e-4), "report"),
+    "eight nodes": (lambda: whole_deck(plate=mesh_of(8), duration=3e-4), "report"),
+    "listing": (for_listing, "listing"),
+}
+
+
+@pytest.mark.parametrize("plate", OTHER_PLATES)
+def test_every_kind_of_plate_has_parts_with_the_numbers_of_the_whole(plate: str) -> None:
+    build, mode = OTHER_PLATES[plate]
+    deck = build()
+    whole = fecm.run_one(deck, mode=mode)
+    codes = {finding.code for finding in load_deck(deck).findings}
+    for axes in PARTS.values():
+        part = part_of(deck, axes)
+        result = fecm.run_one(part, mode=mode)
+        assert result.symmetry_factor == 2 ** len(axes)
+        assert result.metrics == pytest.approx(whole.metrics, rel=1e-9, abs=1e-12, nan_ok=True)
+        assert result.whole("force") == pytest.approx(whole.force, abs=1e-9 * whole.force.max())
+        assert result.end == whole.end
+        notes, expected = ([n.split(" at (")[0] for n in one.notes] for one in (result, whole))
+        assert notes == expected
+        assert {finding.code for finding in load_deck(part).findings} == codes
+        exposures, expected_exposures = (largest_exposures(one) for one in (result, whole))
+        for one, of_whole in zip(exposures, expected_exposures, strict=True):
+            assert one.exposure == pytest.approx(of_whole.exposure, rel=1e-9)
+            assert one.band == pytest.approx(of_whole.band, rel=1e-9)
+
+
+def test_the_rim_of_half_a_window_is_outside_the_supports_which_pull_as_those_of_the_whole() -> (
+    None
+):
+    whole = window_deck().with_(at=(50.0, 80.0 - 80.0 / 12.0))
+    half = part_of(whole, (0,))
+    assert {"W556"} <= findings(whole).keys() & findings(half).keys()
+    runs = fecm.run_one(whole), fecm.run_one(half)
+    pulls = [[note for note in one.notes if "supports pull" in note] for one in runs]
+    assert len(pulls[0]) == 1
+    assert pulls[1] == pulls[0]
+    assert "W556" not in findings(part_of(window_deck(), (0, 1)))
+
+
+def test_the_lengths_that_a_plate_is_judged_by_are_those_of_the_whole() -> None:
+    laminate = fecm.Laminate("[0/90]2", "T300/5208", 0.25)
+    warped = whole_deck(laminate=laminate, in_plane="free", cure=-100.0)
+    free = whole_deck("free")
+    for axes in PARTS.values():
+        warps = [findings(one)["W464"].message for one in (part_of(warped, axes), warped)]
+        assert warps[0] == warps[1]
+        spans = [load_deck(one).problems[0].span for one in (part_of(free, axes), free)]
+        assert spans[0].name == spans[1].name == "plate's shorter side"
+        assert spans[0].length == pytest.approx(80.0)
 
 
 @pytest.mark.parametrize("part", PARTS)

@@ -11,7 +11,7 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._machine import require_memory
-from fecm._typing import Floats
+from fecm._typing import Bools, Floats
 from fecm.mechanics.element_matrices import geometric_stiffness
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.membrane import MembraneForces, tangent
@@ -182,16 +182,20 @@ def static_stiffness(plate: PlateModel, contact: Floats) -> float:
         return math.nan
 
 
-def static_support(plate: PlateModel, contact: Floats) -> tuple[float, float] | None:
+def static_support(
+    plate: PlateModel, contact: Floats, symmetry: Bools | None = None
+) -> tuple[float, float] | None:
     """Return the stiffness under a static unit load, (numnp, 5), and the pull of the supports.
 
     The stiffness is the force per displacement under the load.  The pull is the sum of the forces
-    that hold the plate down.  Only nodes whose w is held and whose rotations are free count: such a
-    support stands for a ring, a window or a knife edge, which can only push.  Returns None for a
-    plate without such nodes, and for a plate that its supports do not hold.
+    that hold the plate down.  Only nodes whose w is held and whose rotations are free count, except
+    dofs that lines of symmetry hold, a mask (numnp, 5): such a support stands for a ring, a window
+    or a knife edge, which can only push.  Returns None for a plate without such nodes, and for a
+    plate that its supports do not hold.
     """
     free = plate.mesh.equations > 0
-    rests = ~free[:, W] & free[:, W + 1 :].all(axis=1)
+    turns = free if symmetry is None else free | symmetry
+    rests = ~free[:, W] & turns[:, W + 1 :].all(axis=1)
     if not rests.any():
         return None
     field, load = np.zeros(free.shape), contact[free]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from fecm._typing import Bools, Indices
+from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.mesh import Ints, MeshArrays, element_blocks, extent
 
@@ -22,18 +23,19 @@ class Span(NamedTuple):
     name: str  # what it is, in messages
 
 
-def unsupported(mesh: MeshArrays, load: tuple[float, float] | None) -> Span:
+def unsupported(mesh: MeshArrays, load: tuple[float, float] | None, whole: Floats) -> Span:
     """Return the distance between supports that counts for bending.
 
     It is the diameter of the largest circle around a node that contains no node with restrained w
     and, if there is a load, reaches it: the shorter distance between two supported sides, the
     diameter of a round window, or twice the length of a cantilever. Without supports it is the
-    shorter side of the plate.
+    shorter side of the plate. `whole` has the nodes of the whole plate, (n, 2), where the mesh is a
+    symmetric part of it.
     """
     places, held = mesh.coordinates[mesh.used], mesh.codes[mesh.used, W] != 0
     free, supports = places[~held], places[held]
     if not len(supports) or not len(free):
-        low, high = extent(places)
+        low, high = extent(whole)
         return Span(float((high - low).min()), "plate's shorter side")
     free = free[:: -(-len(free) // FREE)]
     supports = supports[:: -(-len(supports) // SUPPORTED)]
@@ -101,11 +103,12 @@ def holes(mesh: MeshArrays) -> int:
     return loops - pieces
 
 
-def outside_supports(mesh: MeshArrays) -> Bools:
+def outside_supports(mesh: MeshArrays, symmetry: Sequence[Bools] = ()) -> Bools:
     """Return a mask of the elements outside the supports, such as the rim of a plate on a window.
 
     Lines of supports divide a plate into parts. A part lies outside if no support holds its
-    outline, and supports hold all of another part's border.
+    outline, and supports hold all of another part's border. Lines of symmetry, given by masks of
+    their nodes, are no outline.
     """
     outside = np.zeros(len(mesh.elements), dtype=bool)
     held = mesh.codes[:, W] != 0
@@ -117,7 +120,10 @@ def outside_supports(mesh: MeshArrays) -> Bools:
     count, part = _parts(len(mesh.elements), *_neighbours(sides, ~sides.is_held))
     has_free_outline, has_held_outline = np.zeros((2, count), dtype=bool)
     of_side = part[sides.elements]
-    has_free_outline[of_side[sides.is_outline & ~sides.is_held]] = True
+    is_free = sides.is_outline & ~sides.is_held
+    for line in symmetry:
+        is_free &= ~line[sides.corners].all(axis=1)
+    has_free_outline[of_side[is_free]] = True
     has_held_outline[of_side[sides.is_outline & sides.is_held]] = True
     # Elements whose nodes are all held, such as on a boss, do not count for the plate's span.
     nodes_held = np.concatenate([[True], held])[mesh.elements].all(axis=1)

@@ -111,19 +111,20 @@ class Problem:
 
     @cached_property
     def longer_side(self) -> float:
-        """Longer side of the rectangle around the plate, length."""
-        low, high = extent(self.mesh.coordinates)
+        """Longer side of the rectangle around the whole plate, length."""
+        low, high = extent(self.symmetry.unfolded(self.mesh.coordinates))
         return float((high - low).max())
 
     @cached_property
     def span(self) -> Span:
         """Distance between supports that counts for bending."""
-        return unsupported(self.mesh, self.load_place)
+        whole = self.symmetry.unfolded(self.mesh.coordinates[self.mesh.used])
+        return unsupported(self.mesh, self.load_place, whole)
 
     @cached_property
     def outside_supports(self) -> Bools:
         """Whether every element lies on a free rim outside the supports, (numel,)."""
-        return outside_supports(self.mesh)
+        return outside_supports(self.mesh, self.symmetry.nodes(self.mesh))
 
     @cached_property
     def plate(self) -> PlateModel:

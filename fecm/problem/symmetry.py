@@ -94,6 +94,17 @@ class PartSymmetry(NamedTuple):
             coordinates = np.concatenate([coordinates, images])
         return coordinates
 
+    def nodes(self, mesh: MeshArrays) -> tuple[Bools, ...]:
+        """Return a mask of the used nodes on every line, (numnp,)."""
+        return tuple(nodes_on(mesh, line.axis, line.place) for line in self.lines)
+
+    def held(self, mesh: MeshArrays) -> Bools:
+        """Return a mask of the dofs that symmetry holds, (numnp, 5)."""
+        mask = np.zeros(mesh.codes.shape, dtype=bool)
+        for line, nodes in zip(self.lines, self.nodes(mesh), strict=True):
+            mask[np.ix_(nodes, list(line.mirror.odd))] = True
+        return mask
+
     def images(self, mesh: MeshArrays) -> Floats:
         """Return the number of nodes of the whole plate that each node of the part stands for."""
         counts = np.ones(len(mesh.coordinates))

@@ -357,7 +357,8 @@ def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
     contact, force = problem.contact, result["history/force"]
     if contact is None or not force.any() or problem.deck.control.numel > MOST_SOLVED:
         return
-    support = static_support(problem.moving_plate, contact)
+    held = problem.symmetry.held(problem.mesh)
+    support = static_support(problem.moving_plate, contact, held)
     if support is None:
         return
     stiffness, pull = support
