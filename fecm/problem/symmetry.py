@@ -102,7 +102,7 @@ class PartSymmetry(NamedTuple):
         """Return a mask of the dofs that symmetry holds, (numnp, 5)."""
         mask = np.zeros(mesh.codes.shape, dtype=bool)
         for line, nodes in zip(self.lines, self.nodes(mesh), strict=True):
-            mask[np.ix_(nodes, list(line.mirror.odd))] = True
+            mask[nodes, line.mirror.odd[0]] = mask[nodes, line.mirror.odd[1]] = True
         return mask
 
     def images(self, mesh: MeshArrays) -> Floats:
