@@ -28,6 +28,8 @@ def thick(text: str) -> str:
     return replaced("     2.944$", "       9.6")(text)
 
 
+without_units = replaced(r"^UNIT\n.*\n", "")
+
 MISTAKES: dict[str, tuple[Edit, str, str]] = {  # change, code, and what the text must name
     "strengths in Pa": (
         strengths(*(1e6 * s for s in STRENGTHS)), "W467", "look like Pa; mm, N and s need MPa"),
@@ -108,6 +110,10 @@ MISTAKES: dict[str, tuple[Edit, str, str]] = {  # change, code, and what the tex
     "E1 tenfold": (
         lambda text: any_step(with_ply(e1=1714200.0)(text)), "W584",
         "E1 = 1.7142e+06 looks like it has a digit too many"),
+    "E1 in Pa": (lambda text: any_step(with_ply(e1=1.7142e11)(text)), "W435", "(looks like Pa"),
+    "E1 in Pa without UNIT": (
+        lambda text: without_units(any_step(with_ply(e1=1.7142e11)(text))), "W584",
+        "E1 = 1.7142e+11 seems to be in another unit"),
     "E2 of glass a tenth": (
         with_ply(e1=45600.0, e2=1620.0, g12=5830.0, g13=5830.0, g23=5790.0), "W583",
         "of the shear modulus or of E2"),
@@ -163,9 +169,6 @@ MISTAKES: dict[str, tuple[Edit, str, str]] = {  # change, code, and what the tex
     "velocity in m/s": (
         replaced(r"^(ROD\n.{10}).*", r"\g<1>      1.73"), "W435", "looks like m/s"),
 }  # fmt: skip
-
-
-without_units = replaced(r"^UNIT\n.*\n", "")
 
 
 def test_the_plate_without_mistakes_has_no_finding_with_units_and_without() -> None:

@@ -40,6 +40,7 @@ OTHER_SHEAR = 1.5  # factor on that modulus above which a digit is missing or to
 # E1/E2 of a ply with the shear moduli and NU12 of parallel fibres, but one modulus of ten times or
 # a tenth of its value; unbalanced fabrics have smaller NU12, and G12 between the two ratios.
 LOST_DIGIT = (1.1, 2.5)
+TOO_MANY, TOO_FEW = "looks like it has a digit too many", "looks like it has a digit too few"
 NU12_OF_FIBRES = (0.2, 0.4)
 STIFF_IN_SHEAR, SOFT_IN_SHEAR = 0.41, 0.1  # G12/E2
 FIELD = "shear correction factor"
@@ -278,8 +279,8 @@ def doubtful_shear_modulus(problem: Problem) -> Reports:
 def moduli_with_lost_digit(problem: Problem) -> Reports:
     """E1/E2 is above 120, or near 1 in a ply that is otherwise one of fibres.
 
-    A digit of E1 or E2 is likely missing or too many. A ply of fabric has E1/E2 near 1 too, but a
-    smaller NU12, and G12 of 0.1 to 0.4 E2.
+    A digit of E1 or E2 is likely missing or too many, or one of them is in another unit. A ply of
+    fabric has E1/E2 near 1 too, but a smaller NU12, and G12 of 0.1 to 0.4 E2.
 
     Remedy: E1/E2 of plies of glass fibres is about 3, of carbon fibres 10 to 25.
     """
@@ -289,25 +290,26 @@ def moduli_with_lost_digit(problem: Problem) -> Reports:
         name, fault = suspect
         message = (
             f"E1/E2 = {ply.e1 / ply.e2:.3g} with G12/E2 = {ply.g12 / ply.e2:.2g} and NU12 = "
-            f"{ply.nu12:g} is unlike any ply: {name} = {getattr(ply, name.lower()):g} looks like "
-            f"it has a digit {fault}."
+            f"{ply.nu12:g} is unlike any ply: {name} = {getattr(ply, name.lower()):g} "
+            f"{fault}."
         )
         hint = "E1/E2 is about 3 for glass fibres, and 10 to 25 for carbon fibres"
         yield Report(message, ply.place(f"Young's modulus {name}"), hint)
 
 
 def _modulus_with_lost_digit(ply: model.Ply) -> tuple[str, str] | None:
-    """Return the modulus that seems to have a digit too many or too few, and which of the two."""
+    """Return the modulus that is out of order, and what it seems to be."""
     ratio, shear = ply.e1 / ply.e2, ply.g12 / ply.e2
     if ratio > LARGEST_MODULI_RATIO:
         least, most = SHEAR_OF_FIBROUS["G12"]
-        return ("E1", "too many") if least <= shear <= most else ("E2", "too few")
+        name, fault = ("E1", TOO_MANY) if least <= shear <= most else ("E2", TOO_FEW)
+        return name, fault if ratio < 10.0 * LARGEST_MODULI_RATIO else "seems to be in another unit"
     (low, high), (least, most) = LOST_DIGIT, NU12_OF_FIBRES
     if not (low < ratio < high and least <= ply.nu12 <= most):
         return None
     if shear > STIFF_IN_SHEAR and 2.0 * min(ply.g13, ply.g23) > ply.g12:
-        return "E1", "too few"
-    return ("E2", "too many") if shear < SOFT_IN_SHEAR else None
+        return "E1", TOO_FEW
+    return ("E2", TOO_MANY) if shear < SOFT_IN_SHEAR else None
 
 
 @rule("W585", Subject.LAMINATE)
