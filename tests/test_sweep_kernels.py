@@ -14,7 +14,9 @@ from fecm._typing import Floats
 from fecm.authoring import Case
 from fecm.mechanics import HystereticLaw, LinearPermanent, kernels
 from fecm.problem import RunOptions, build_model, load_deck
+from fecm.results import Deflection
 from fecm.sweeps import backends, methods, plate_response, responses
+from tests.decks import PROGRAM, small
 from tests.test_kernels import compiled
 
 DECK = Path("decks/impact-115.inp").read_text().replace("LOOP       4000", "LOOP        600")
@@ -22,6 +24,7 @@ RIGID = DECK.replace("EXPE", "PROJ\n    0    0  0.000181\n\nEXPE")
 GAGE = "PATC\nDISC             0.2\n\nGAGE\n    1       2.5       2.0     0.053        0.\n\nEXPE"
 LAW = "EXPE\n  1912000. 0.0006564     0.094       2.0"
 COUNT = 16
+FREE = PROGRAM.replace("LOOP         10", "LOOP        400")
 
 
 def drawn(**ranges: tuple[float, float]) -> list[Case]:
@@ -47,7 +50,7 @@ RODS = drawn(velocity=(20.0, 300.0), rod_length=(0.5, 2.0), k=(1e6, 3e6))
 
 def without_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernels, "LIBRARY", None)
-    methods._plate.cache_clear()
+    monkeypatch.setattr(methods, "_plate", methods._plate.__wrapped__)  # keeps no plate for others
 
 
 @compiled
@@ -118,6 +121,40 @@ def test_errors_of_the_energy_balance_are_those_of_numpy(monkeypatch: pytest.Mon
             for column in (getattr(found.plate, name), values)
         )
         np.testing.assert_allclose(computed, expected, rtol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("solver", ["numpy", pytest.param("kernels", marks=compiled)])
+def test_a_plate_that_nothing_holds_bends_as_its_motion_less_the_rigid_motion_does(
+    solver: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside sums over all earlier forces of the response without its rigid part."""
+    seen: list[tuple[responses.ComputedImpacts, Floats, float, float, responses.Hits]] = []
+
+    def watched(
+        response: Floats, dt: float, mass: float, hits: responses.Hits, mobility: float
+    ) -> responses.ComputedImpacts:
+        made = responses.impacts(response, dt, mass, hits, mobility)
+        seen.append((made, response, dt, mobility, hits))
+        return made
+
+    monkeypatch.setattr(backends, "impacts", watched)
+    if solver == "numpy":
+        without_kernels(monkeypatch)
+    speeds = np.linspace(10.0, 300.0, 11)
+    fecm.sweep(small(FREE), {"velocity": speeds.tolist()})
+    ((found, response, dt, mobility, hits),) = seen
+    assert mobility == pytest.approx(1.0 / (0.000148 * 2.0 * 2.0 * 0.106), rel=1e-9)
+    steps = len(response)
+    bending = response - mobility * dt**2 * np.arange(1, steps + 1)
+    before = np.vstack([np.zeros(len(speeds)), found.force[:-1]])
+    bent = np.stack([np.convolve(bending, force)[:steps] for force in before.T], axis=1)
+    work = np.cumsum(0.5 * (before + found.force) * np.diff(bent, axis=0, prepend=0.0), axis=0)
+    times: Floats = np.linspace(dt, steps * dt, steps)
+    energy = 0.5 * hits.rods[0].total_mass * speeds**2
+    wanted = Deflection.of(bent, times, work, energy)
+    np.testing.assert_allclose(found.plate.speed, wanted.speed, rtol=1e-10)
+    np.testing.assert_allclose(found.plate.compliance, wanted.compliance, rtol=1e-10)
+    np.testing.assert_allclose(found.plate.energy, wanted.energy, rtol=1e-9)
 
 
 @compiled

@@ -41,8 +41,9 @@ class ResultRow(IntEnum):
     LOST = 6  # largest difference of the energy from the initial energy
     INITIAL = 7  # kinetic energy of the approach
     UNCONVERGED = 8  # steps whose contact iteration did not converge
+    # Without the rigid motion of a plate that is not held:
     LARGEST_DW = 9  # largest change of the displacement in a step
-    PLATE_WORK = 10  # work of the contact force on the plate
+    BENT_WORK = 10  # work of the contact force on the plate
     COMPLIANCE = 11  # largest w^2/(2 E) of the plate; see :data:`~fecm.results.end.LEAST_WORK`
     CONTACT_WORK = 12  # work of the contact force on the indentation
 
@@ -74,6 +75,7 @@ class SweepStruct(Structure):
         ("theta", c_double),  # as in ``impact_steps.RodStruct``
         ("weight_before", c_double),
         ("weight", c_double),
+        ("rigid", c_double),  # rigid displacement of the plate per force and step since
         ("T", Doubles),
         ("h", Doubles),
         ("stiffness", Doubles),
@@ -90,6 +92,7 @@ def sweep_impacts(
     step: RodIntegrator,
     law: LawKind,
     response: Floats,
+    rigid: float,
     given: Floats,
     force: Floats,
     found: Floats,
@@ -97,7 +100,8 @@ def sweep_impacts(
     """Compute the impacts of many cases by a projectile; write `force` and `found`.
 
     `response` is (steps,), `force` is (cases, steps).  `given` (given, cases) and `found`
-    (found, cases) may be columns of larger arrays.  Raises MemoryError.
+    (found, cases) may be columns of larger arrays.  A plate that is not held has a rigid motion:
+    `rigid` times the number of steps since a force of 1.  Raises MemoryError.
     """
     T, h = modes.step(step)
     before, after = step.weights
@@ -112,6 +116,7 @@ def sweep_impacts(
         theta=step.theta,
         weight_before=before,
         weight=after,
+        rigid=rigid,
         T=T,
         h=h,
         stiffness=modes.stiffness,

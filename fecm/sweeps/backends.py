@@ -41,7 +41,6 @@ from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
 from fecm.sweeps.responses import (
     ComputedImpacts,
     Hits,
-    about_rigid_motion,
     impacts,
     largest_sums,
     plate_response,
@@ -203,13 +202,7 @@ class PlateResponse(NamedTuple):
 
     def impacts(self, hits: Hits) -> ComputedImpacts:
         """Compute many impacts."""
-        struck = impacts(self.response, self.dt, self.node_mass, hits)
-        if not self.mobility:
-            return struck
-        plate = about_rigid_motion(
-            struck.plate, self.response, self.dt, self.mobility, hits, struck.force
-        )
-        return struck._replace(plate=plate)
+        return impacts(self.response, self.dt, self.node_mass, hits, self.mobility)
 
 
 def _plate_response(checked: Problem, *, gages: bool) -> PlateResponse:

@@ -110,7 +110,7 @@ class ReducedImpacts:
             w = moved + flexibility * state.contact.force
             work = work + 0.5 * (last + force[step]) * (w - before)
             deepest = np.maximum(deepest, law.of_law(state.contact).indentation)
-            record.add(w, work)
+            record.add(w, work, w)
             if not (step + 1) % BLOCK or step + 1 == self.steps:
                 done.append(state.contact_work + motion.energy(state.contact.force))
         permanent = law.permanent(state.memory, state.contact)

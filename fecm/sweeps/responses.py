@@ -275,20 +275,28 @@ class Work(NamedTuple):
     excess: Floats  # (cases,): largest dt^2/8 m a^2 of the impact node; see :func:`balance_errors`
 
 
-def impacts(response: Floats, dt: float, node_mass: float, hits: Hits) -> ComputedImpacts:
+def impacts(
+    response: Floats, dt: float, node_mass: float, hits: Hits, mobility: float = 0.0
+) -> ComputedImpacts:
     """Compute many impacts on a plate from its response to a unit force, (steps,).
 
     `node_mass` is the mass that the contact force accelerates: the lumped mass of the impact node,
-    or 1/(g M^-1 g) of a patch with the weights g.
+    or 1/(g M^-1 g) of a patch with the weights g. `mobility` (1/mass) is the mobility of the rigid
+    motion of a plate that is not held.
     """
-    law = hits.law
+    law, rigid = hits.law, mobility * dt**2
     if kernels.LIBRARY is not None and isinstance(law, HystereticLaw) and knows(law.constants):
-        return _by_kernels(response, dt, node_mass, hits, law.constants)
-    return by_numpy(response, node_mass, TipSteps(hits, dt, len(response)))[0]
+        return _by_kernels(response, dt, node_mass, hits, law.constants, rigid)
+    return by_numpy(response, node_mass, TipSteps(hits, dt, len(response)), rigid)[0]
 
 
-def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[ComputedImpacts, Work]:
-    """Compute impacts step by step, all cases together; see :func:`impacts`."""
+def by_numpy(
+    response: Floats, node_mass: float, tips: TipSteps, rigid: float = 0.0
+) -> tuple[ComputedImpacts, Work]:
+    """Compute impacts step by step, all cases together; see :func:`impacts`.
+
+    `rigid` is the displacement of the rigid motion of the plate per force and step since.
+    """
     law, speed = tips.hits.law, tips.hits.speed
     steps, cases = len(response), len(speed)
     none = np.zeros(cases)
@@ -304,6 +312,7 @@ def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Comput
     )
     force, deepest = np.empty((steps, cases)), none
     plate_work, dw, largest_ddw = none, none, none
+    pushes, rigid_w, bent, bent_work = none, none, none, none
     record = DeflectionRecord(tips)
     done: list[Floats] = []
     for step in range(steps):
@@ -317,7 +326,12 @@ def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Comput
         before, dw = dw, state.plate_w - w
         plate_work = plate_work + 0.5 * (last + state.contact.force) * dw
         largest_ddw = np.maximum(largest_ddw, np.abs(dw - before))
-        record.add(state.plate_w, plate_work)
+        # A plate that is not held moves by n `rigid` per force n steps ago.
+        pushes = pushes + last
+        rigid_w = rigid_w + rigid * pushes
+        bent_before, bent = bent, state.plate_w - rigid_w
+        bent_work = bent_work + 0.5 * (last + state.contact.force) * (bent - bent_before)
+        record.add(state.plate_w, bent_work, bent)
         if not (step + 1) % BLOCK or step + 1 == steps:
             done.append(state.contact_work + plate_work)
     permanent = law.permanent(state.memory, state.contact)
@@ -329,28 +343,6 @@ def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Comput
     return ComputedImpacts(
         force, indentation, state.unconverged_steps, record.deflection, error
     ), work
-
-
-def about_rigid_motion(
-    plate: Deflection, response: Floats, dt: float, mobility: float, hits: Hits, force: Floats
-) -> Deflection:
-    """Return the motion of a plate that is not held with what the rigid motion leaves of it.
-
-    `mobility` (1/mass) is the mobility of the rigid motion, `force` are the contact forces (steps,
-    cases). The rigid motion of the plate after n steps is n mobility dt^2 per force in the first.
-    """
-    steps = len(response)
-    bent = rfft(response - mobility * dt**2 * np.arange(1, steps + 1), 2 * steps)
-    times, initial = np.add.accumulate(np.full(steps, dt)), _energies(hits)
-    parts = []
-    for first in range(0, force.shape[1], TILE):
-        part = force[:, first : first + TILE]
-        before = np.concatenate([np.zeros_like(part[:1]), part[:-1]])
-        w = irfft(bent[:, None] * rfft(before, 2 * steps, axis=0), axis=0)[:steps]
-        work = np.add.accumulate(0.5 * (before + part) * np.diff(w, axis=0, prepend=0.0))
-        parts.append(Deflection.of(w, times, work, initial[first : first + TILE]))
-    about = Deflection(*(np.concatenate(values) for values in list(zip(*parts, strict=True))[:5]))
-    return about._replace(largest=plate.largest, last=plate.last)
 
 
 def _energies(hits: Hits) -> Floats:
@@ -368,16 +360,21 @@ class DeflectionRecord:
         self._dt = tips.dt
         none = np.zeros(len(hits.kind))
         self.deflection = Deflection(none, none, none, none, none)
+        self._bent = none
 
-    def add(self, w: Floats, energy: Floats) -> None:
-        """Add a step: displacement and energy of the plate, (cases,) each."""
-        before = self.deflection
+    def add(self, w: Floats, energy: Floats, bent: Floats) -> None:
+        """Add a step, (cases,) each.
+
+        `energy` of the plate and displacement `bent` are without the rigid motion of a plate that
+        is not held.
+        """
+        before, last, self._bent = self.deflection, self._bent, bent
         with np.errstate(all="ignore"):
-            compliance = w * np.abs(w) / (2.0 * np.maximum(energy, self._least))
+            compliance = bent * np.abs(bent) / (2.0 * np.maximum(energy, self._least))
         self.deflection = Deflection(
             np.maximum(before.largest, w),
             w,
-            np.maximum(before.speed, np.abs(w - before.last) / self._dt),
+            np.maximum(before.speed, np.abs(bent - last) / self._dt),
             energy,
             np.fmax(before.compliance, compliance),
         )
@@ -419,6 +416,7 @@ def _by_kernels(
     node_mass: float,
     hits: Hits,
     constants: ContactParameters[Floats],
+    rigid: float,
 ) -> ComputedImpacts:
     """Compute impacts by the compiled kernels, and projectiles by their modes."""
     law = kernel_law(constants)
@@ -442,6 +440,7 @@ def _by_kernels(
             step,
             law.kind,
             response,
+            rigid,
             inputs[:, chosen],
             force[chosen],
             results[:, chosen],
@@ -461,7 +460,7 @@ def _by_kernels(
             largest=results[ResultRow.HIGHEST],
             last=results[ResultRow.W],
             speed=results[ResultRow.LARGEST_DW] / dt,
-            energy=results[ResultRow.PLATE_WORK],
+            energy=results[ResultRow.BENT_WORK],
             compliance=results[ResultRow.COMPLIANCE],
         ),
         error=lost / np.where(initial > 0.0, initial, 1.0),

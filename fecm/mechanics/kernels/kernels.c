@@ -110,6 +110,8 @@ typedef struct {
     half scale, gain; /* factor of mass and stiffness; acceleration of the tip per force */
     half tip, velocity, acceleration, indentation, force, push, w, dw;
     half initial, contact_work, plate_work; /* energies */
+    half bent, bent_work; /* displacement without the rigid motion of the plate, and the work of the force on it */
+    half pushes, rigid;   /* sum of the forces, and the displacement of the rigid motion */
     half deepest, highest, sharpest, lost, unconverged; /* see FOUND_DEEPEST and so on */
     half fastest, compliance; /* see FOUND_LARGEST_DW and so on */
 } Cases;

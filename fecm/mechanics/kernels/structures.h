@@ -139,6 +139,7 @@ typedef struct {
     int64_t cases, stride, steps, modes; /* `stride`: columns of the arrays of cases */
     int64_t law;                         /* kind of the contact law */
     double dt, theta, weight_before, weight; /* as in RodIntegrator */
+    double rigid; /* rigid displacement of the plate per force and step since; 0 if the plate is held */
     const double *T, *h, *stiffness, *tip_shape; /* modes: see Rod */
     const double *plate; /* (steps,): displacement per force after 1, 2, ... steps */
     const double *given; /* (GIVEN, cases) */
@@ -150,11 +151,11 @@ enum { GIVEN_K, GIVEN_Q, GIVEN_CRITICAL, GIVEN_SLOPE, GIVEN_VELOCITY, GIVEN_FACT
 
 /* Rows of `found`: largest, last and permanent indentation; largest and last displacement of the plate, and
  * its largest second difference; largest error of the energies, initial energy, and number of steps whose
- * contact iteration did not converge; largest change of the displacement in a step, work on the plate,
- * largest compliance, and work on the indentation. */
+ * contact iteration did not converge; without the rigid motion of the plate, the largest change of the
+ * displacement in a step, the work on the plate and the largest compliance; work on the indentation. */
 enum {
     FOUND_DEEPEST, FOUND_INDENTATION, FOUND_PERMANENT, FOUND_HIGHEST, FOUND_W, FOUND_LARGEST_DDW, FOUND_LOST,
-    FOUND_INITIAL, FOUND_UNCONVERGED, FOUND_LARGEST_DW, FOUND_PLATE_WORK, FOUND_COMPLIANCE,
+    FOUND_INITIAL, FOUND_UNCONVERGED, FOUND_LARGEST_DW, FOUND_BENT_WORK, FOUND_COMPLIANCE,
     FOUND_CONTACT_WORK, FOUND
 };
 

@@ -291,21 +291,26 @@ INLINE void NAME(begin)(const Sweep *x, const Response *r, int64_t first, Cases 
     c->indentation = c->force = c->push = c->w = c->dw = none;
     c->deepest = c->highest = c->sharpest = c->lost = c->unconverged = none;
     c->fastest = c->compliance = none;
+    c->bent = c->bent_work = c->pushes = c->rigid = none;
     c->plate_work = c->contact_work = none;
 }
 
 /* Record a step that ends at a displacement of the plate, a force and an indentation. */
-INLINE void NAME(record)(Cases *c, half w, half force, half indentation) {
+INLINE void NAME(record)(const Sweep *x, Cases *c, half w, half force, half indentation) {
     const half mean = 0.5 * (c->force + force), before = c->dw;
     c->contact_work += mean * (indentation - c->indentation);
     c->dw = w - c->w;
     c->plate_work += mean * c->dw;
     const half bend = NAME(size)(c->dw - before);
-    c->w = w, c->force = force, c->indentation = indentation;
-    const half fast = NAME(size)(c->dw), least = LEAST_WORK * c->initial;
+    c->pushes += c->force;
+    c->rigid += x->rigid * c->pushes;
+    const half bent = w - c->rigid, change = bent - c->bent;
+    c->bent_work += mean * change;
+    c->w = w, c->bent = bent, c->force = force, c->indentation = indentation;
+    const half fast = NAME(size)(change), least = LEAST_WORK * c->initial;
     c->fastest = NAME(choose)(fast > c->fastest, fast, c->fastest);
-    const half energy = NAME(choose)(c->plate_work > least, c->plate_work, least);
-    const half compliance = w * NAME(size)(w) / (2.0 * energy);
+    const half energy = NAME(choose)(c->bent_work > least, c->bent_work, least);
+    const half compliance = bent * NAME(size)(bent) / (2.0 * energy);
     c->compliance = NAME(choose)(compliance > c->compliance, compliance, c->compliance);
     c->sharpest = NAME(choose)(bend > c->sharpest, bend, c->sharpest);
     c->deepest = NAME(choose)(indentation > c->deepest, indentation, c->deepest);
@@ -367,7 +372,7 @@ INLINE void NAME(couple)(const Sweep *x, Cases *cases, const half *w, const half
                 m->p[lane] = new.p, m->peak[lane] = new.peak, m->peak_force[lane] = new.peak_force;
                 m->permanent[lane] = new.permanent;
             }
-    for (int g = 0; g < GROUPS; g++) NAME(record)(cases + g, w[g], force[g], a[g]);
+    for (int g = 0; g < GROUPS; g++) NAME(record)(x, cases + g, w[g], force[g], a[g]);
 }
 
 /* Compare the energies of the cases with the initial energies. */
@@ -396,7 +401,7 @@ INLINE void NAME(store_found)(const Sweep *x, const Cases *c) {
             [FOUND_INITIAL] = c->initial[lane],
             [FOUND_UNCONVERGED] = c->unconverged[lane],
             [FOUND_LARGEST_DW] = c->fastest[lane],
-            [FOUND_PLATE_WORK] = c->plate_work[lane],
+            [FOUND_BENT_WORK] = c->bent_work[lane],
             [FOUND_COMPLIANCE] = c->compliance[lane],
             [FOUND_CONTACT_WORK] = c->contact_work[lane],
         };
