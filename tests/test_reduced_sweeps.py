@@ -78,7 +78,8 @@ def test_impacts_up_to_twice_the_thickness_are_those_of_a_spectral_program(case:
         name: np.array([float(row[name]) for row in rows])
         for name in ("velocity_mm_per_s", "peak_N", "W_max_mm", "contact_end_s")
     }
-    deck = struck_rectangle(case, 16, 1.0, 1.02 * float(wanted["contact_end_s"].max()))
+    # The largest deflection is open until the plate can't reach the projectile any more.
+    deck = struck_rectangle(case, 16, 1.0, 1.3 * float(wanted["contact_end_s"].max()))
     found = fecm.sweep(
         deck,
         {"velocity": wanted["velocity_mm_per_s"].tolist()},
