@@ -272,15 +272,15 @@ def large_patch_without_stresses(problem: Problem, card: model.Patch) -> Reports
 
 
 @rule("W568", Subject.POINTS)
-def small_patch(problem: Problem) -> Reports:
+def small_patch(problem: Problem, card: model.Patch) -> Reports:
     """The radius of the patch is below a hundredth of the thickness.
 
     It is likely in another unit. The load is that of a point, and stresses under it are too large.
 
     Remedy: The radius of the contact in the deck's unit of length, or blank for 0.327 h.
     """
-    card, thickness = problem.deck.last(model.Patch), problem.laminate.thickness
-    if card is None or card.radius is None or card.radius >= SMALL * thickness:
+    thickness = problem.laminate.thickness
+    if card.radius is None or card.radius >= SMALL * thickness:
         return
     names = unit_names(problem.deck)
     usual = RADIUS_PER_THICKNESS[card.shape] * thickness

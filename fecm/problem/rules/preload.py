@@ -66,7 +66,7 @@ def large_preload(problem: Problem, card: model.Preload) -> Reports:
 
 
 @rule("W569", Subject.LAMINATE)
-def small_preload(problem: Problem) -> Reports:
+def small_preload(problem: Problem, card: model.Preload) -> Reports:
     """The preload of PREL is without effect.
 
     The strain by the preload is below 10⁻³ (h/a)² of thickness h and longer side a; plates buckle
@@ -74,8 +74,7 @@ def small_preload(problem: Problem) -> Reports:
 
     Remedy: The unit of force over length: N/m in m and N.
     """
-    card = problem.deck.last(model.Preload)
-    if card is None or not any(card.forces):
+    if not any(card.forces):
         return
     largest = float(np.abs(problem.plate.preload_strain).max())
     slenderness = problem.laminate.thickness / problem.longer_side
