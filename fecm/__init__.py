@@ -17,7 +17,7 @@ from fecm._version import __version__ as __version__
 _methods.FUNCTIONS.update(
     {
         "Deck.with_": ("fecm.authoring.changes", "with_values"),
-        "Deck.with_program": ("fecm.authoring.changes", "with_program"),
+        "Deck.with_program": ("fecm.deck.reader", "with_program"),
         "Result.plot": ("fecm.plot.pictures", "draw_results"),
         "Result.report": ("fecm.report.report", "write_report"),
     }

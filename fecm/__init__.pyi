@@ -8,10 +8,10 @@ from fecm._extensions import ExtensionError as ExtensionError
 from fecm._version import __version__ as __version__
 from fecm._watch import Watch as Watch
 from fecm.authoring.contact import Contact as Contact
-from fecm.authoring.impact import impact as impact
 from fecm.authoring.laminate import Laminate as Laminate
+from fecm.authoring.new_deck import impact as impact
+from fecm.authoring.new_deck import plate_deck as plate_deck
 from fecm.authoring.plate import Plate as Plate
-from fecm.authoring.plate_deck import plate_deck as plate_deck
 from fecm.deck.catalogue import contacts as contacts
 from fecm.deck.catalogue import materials as materials
 from fecm.deck.findings import DeckError as DeckError

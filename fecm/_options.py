@@ -31,6 +31,7 @@ class Option(NamedTuple):
 
     help: str  # for Python and for the help page of the command
     python: str  # what only Python offers
+    default_text: str  # the default in words, if it is not the default of the field
     group: str  # heading on that page; empty if only Python has the option
     choices: Sequence[str]
     metavar: str | None
@@ -43,6 +44,7 @@ def option(
     help: str,
     *,
     python: str = "",
+    default_text: str = "",
     group: str = "",
     choices: Sequence[str] = (),
     metavar: str | None = None,
@@ -50,15 +52,15 @@ def option(
     least: float | None = None,
 ) -> Any:
     """Return the field of an option; see :class:`Option`."""
-    about = Option(help, python, group, choices, metavar, flag, least)
+    about = Option(help, python, default_text, group, choices, metavar, flag, least)
     return field(default=default, metadata={"option": about})
 
 
 def declared_options(job: Any) -> dict[str, tuple[Option, Any]]:
-    """Return the options of a job by name, with their default values."""
+    """Return the options of a job by name, in the order of its signature, with their defaults."""
     return {
         field.name: (field.metadata["option"], field.default)
-        for field in fields(job)
+        for field in sorted(fields(job), key=lambda field: field.kw_only is True)
         if "option" in field.metadata
     }
 
@@ -74,7 +76,9 @@ def _parameters(job: Any) -> str:
     lines = []
     types = {field.name: field.type for field in fields(job)}
     for name, (about, _) in declared_options(job).items():
-        text = textwrap.fill(" ".join(f"{about.help} {about.python}".split()), WIDTH - 8)
+        default = f"By default {about.default_text}." if about.default_text else ""
+        words = f"{about.help} {default} {about.python}".split()
+        text = textwrap.fill(" ".join(words), WIDTH - 8)
         lines += [f"{name} : {types[name]}", textwrap.indent(text, "    ")]
     return textwrap.indent("\n".join(lines), "    ").strip()
 
@@ -113,6 +117,8 @@ def with_parameters_of(job: Callable[P, J]) -> Callable[[Callable[[J], R]], Call
         returns = inspect.signature(function).return_annotation
         signature = inspect.signature(job).replace(return_annotation=returns)
         called.__signature__ = signature  # type: ignore[attr-defined]
+        types = {name: parameter.annotation for name, parameter in signature.parameters.items()}
+        called.__annotations__ = types | {"return": returns}
         return described_by(job)(called)
 
     return decorate

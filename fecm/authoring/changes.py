@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypedDict
@@ -13,15 +13,12 @@ from fecm.authoring.parameters import in_units
 from fecm.authoring.timing import clock_of, with_clock
 from fecm.authoring.values import NAMES, apply_case, check_known, dimension_of
 from fecm.deck.catalogue import system_of
-from fecm.deck.findings import DeckError
-from fecm.deck.macros import Macro, compile_program, with_outputs
-from fecm.deck.model import END, MACROS, STOP, TITLE, Deck, Nonlinear
+from fecm.deck.model import Deck, Nonlinear
 from fecm.deck.quantities import EXAMPLES, text_of
-from fecm.deck.reader import Reader
 
 if TYPE_CHECKING:
     from fecm.authoring.contact import AnyContact
-    from fecm.authoring.impact import AnyProjectile
+    from fecm.authoring.deck_options import AnyProjectile
     from fecm.authoring.laminate import Laminate
     from fecm.authoring.plate import Plate, Support
 
@@ -153,38 +150,3 @@ def _update_time_step(deck: Deck, changed: Deck, case: Case) -> Deck:
         if (clock := clock_of(check_deck(deck))) is not None:
             return with_clock(changed, clock, case).deck
     return changed
-
-
-def with_program(
-    deck: Deck,
-    macros: str | Sequence[Macro] | None = None,
-    *,
-    every: int | None = None,
-    plies: int | bool | tuple[int, int] | None = None,
-    failure: int | bool | None = None,
-) -> Deck:
-    """Return a deck with another macro program; see :meth:`fecm.Deck.with_program`."""
-    if isinstance(macros, str):
-        deck = with_cards(deck, macros)
-    elif macros is not None:
-        deck = replace(deck, macros=tuple(macros))
-    program = with_outputs(deck.macros, every=every, plies=plies, failure=failure)
-    return replace(deck, macros=program, text="")
-
-
-def with_cards(deck: Deck, cards: str) -> Deck:
-    """Return the deck with another macro program: the cards between MACR and END.
-
-    END and the load tables of PROP may follow. Without END the load tables of the deck stay. Raises
-    DeckError if the cards are not a macro program.
-    """
-    lines = [TITLE, deck.control.to_card(), END, MACROS, *cards.rstrip("\n").split("\n")]
-    if END not in map(str.strip, lines[4:]):
-        lines += [END, *(table.to_card() for table in deck.tables)]
-    reader = Reader("\n".join([*lines, STOP, ""]))
-    decks = [problem.deck for problem in reader.problems() if problem.deck is not None]
-    for parsed in decks:
-        compile_program(parsed.macros, reader.findings)
-    if errors := reader.findings.errors:
-        raise DeckError(errors, "<macros>")
-    return replace(deck, macros=decks[0].macros, tables=decks[0].tables)

@@ -5,19 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from fecm.authoring.contact import parse_patch
+from fecm.authoring.deck_options import (
+    AUTO,
+    EQUI,
+    LIMIT,
+    LINEAR,
+    MITC,
+    VON_KARMAN,
+    DeckOptions,
+    ImpactOptions,
+    Kinematics,
+)
 from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck import model
-from fecm.deck.macros import (
-    EXTENDED,
-    TESTS,
-    Rows,
-    RowsOfPlies,
-    steps_of_plies,
-    with_outputs,
-)
+from fecm.deck.macros import EXTENDED, TESTS, steps_of_plies, with_outputs
 from fecm.deck.model import Allowables, Deck, Macro, Patch, Shear
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.points import HERTZ
@@ -27,7 +31,7 @@ from fecm.problem.generate import generate
 from fecm.problem.loading import load_deck
 from fecm.problem.parts import build_plate, has_assumed_shear
 from fecm.problem.problem import Problem
-from fecm.results.validity import IN_PLANE_WORDS, LIMITS, InPlane
+from fecm.results.validity import IN_PLANE_WORDS
 
 ROWS = 200  # default number of stored rows of strains and displacements
 
@@ -36,102 +40,88 @@ ROWS = 200  # default number of stored rows of strains and displacements
 AROUND_LOAD = 3.0
 FEWEST_ELEMENTS = 24
 
-AUTO = "auto"  # the default patch: a disc, or Hertz's patch with a standard
-EQUI: Literal["equi"] = "equi"  # shear stiffness from equilibrium
-Quadrature = Literal["mitc", "full"]  # treatment of transverse shear
-MITC: Quadrature = "mitc"
-FULL: Quadrature = "full"
+
+def contact_patch(options: DeckOptions) -> Patch | None:
+    """Return the contact patch; the default is Hertz's if a standard prescribes the test."""
+    if options.patch == AUTO:
+        return Patch(HERTZ) if options.test else Patch()
+    return parse_patch(options.patch) if isinstance(options.patch, str) else options.patch
 
 
-class Numerics(NamedTuple):
-    """Numerical options of an impact."""
+def shear_segment(options: DeckOptions) -> Shear | None:
+    """Return the SHEA segment; None for the report's shear stiffness and quadrature."""
+    factor, assumed = options.shear_factor, options.shear == MITC
+    if factor is None:
+        factor = EQUI if assumed else 1.0
+    if factor == EQUI:
+        return Shear(assumed=assumed, equilibrium=True)
+    if isinstance(factor, str):
+        raise ObjectError(f"`shear_factor` is {factor!r}, not a number or {EQUI}")
+    check_positive(shear_factor=factor)
+    return Shear(factor, assumed=assumed) if assumed or factor != 1.0 else None
 
-    patch: str | Patch | None = AUTO
-    shear: Quadrature = MITC
-    # Factor of the shear stiffness; by default EQUI with assumed strains, and 1 without.
-    shear_factor: float | Literal["equi"] | None = None
-    duration: float | str | None = None
-    dt: float | str | None = None
-    every: int | None = None  # steps between stored rows
-    plies: RowsOfPlies | None = None  # steps between rows of ply stresses
-    failure: Rows | None = None  # steps between evaluations of failure
-    damage: bool = False  # whether the deck stores data about damage
 
-    def contact_patch(self, *, prescribed: bool) -> Patch | None:
-        """Return the contact patch; the default is Hertz's if a standard prescribes the test."""
-        if self.patch == AUTO:
-            return Patch(HERTZ) if prescribed else Patch()
-        return parse_patch(self.patch) if isinstance(self.patch, str) else self.patch
-
-    def shear_segment(self) -> Shear | None:
-        """Return the SHEA segment; None for the report's shear stiffness and quadrature."""
-        factor, assumed = self.shear_factor, self.shear == MITC
-        if factor is None:
-            factor = EQUI if assumed else 1.0
-        if factor == EQUI:
-            return Shear(assumed=assumed, equilibrium=True)
-        if isinstance(factor, str):
-            raise ObjectError(f"`shear_factor` is {factor!r}, not a number or {EQUI}")
-        check_positive(shear_factor=factor)
-        return Shear(factor, assumed=assumed) if assumed or factor != 1.0 else None
-
-    def time_step(self, deck: Deck) -> float:
-        """Return 0.9 of the critical time step."""
-        mesh = generate(deck)
-        if not mesh.number_of_equations:
+def chosen_time_step(options: ImpactOptions, deck: Deck) -> float:
+    """Return 0.9 of the critical time step."""
+    mesh = generate(deck)
+    if not mesh.number_of_equations:
+        return 1.0  # the deck is refused later
+    try:
+        return rounded_time_step(critical_time_step(build_plate(deck, mesh)))
+    except UnsoundPlateError:
+        if load_deck(replace(deck, macros=program(options, deck, 1.0, 1.0))).errors():
             return 1.0  # the deck is refused later
-        try:
-            return rounded_time_step(critical_time_step(build_plate(deck, mesh)))
-        except UnsoundPlateError:
-            if load_deck(replace(deck, macros=self.program(deck, 1.0, 1.0))).errors():
-                return 1.0  # the deck is refused later
-            raise
+        raise
 
-    def program(
-        self,
-        deck: Deck,
-        dt: float,
-        duration: float,
-        elements: int | None = None,
-        *,
-        until_over: bool = False,
-    ) -> tuple[Macro, ...]:
-        """Return the macro program of an impact.
 
-        By default it stores ply stresses in `elements` elements; None stores no ply stresses.
-        `until_over` ends it once the impact is over, after at most EXTENDED times the duration.
-        """
-        steps = max(1, math.ceil(duration / dt - 1e-9))
-        rows = self.every if self.every is not None else max(1, steps // ROWS)
-        words = {"LMAS": 0.0, "DT": dt, "LOOP": float(steps), "TIME": 0.0}
-        words |= {"RODP": float(rows), "DISP": float(rows), "NEXT": 0.0}
-        macros = [Macro(word, value=value) for word, value in words.items()]
-        failure = deck.has(Allowables) if self.failure is None else self.failure
-        plies = self.plies
-        if plies is None and elements is not None:
-            plies = (steps_of_plies(steps, rows), elements)
-        macros = list(with_outputs(macros, failure=failure, plies=plies))
-        if until_over:
-            macros[2] = Macro("LOOP", value=float(EXTENDED * steps))
-            macros.insert(-1, Macro("OVER", value=float(max(1, steps // TESTS))))
-        return tuple(macros)
+def program(
+    options: ImpactOptions,
+    deck: Deck,
+    dt: float,
+    duration: float,
+    elements: int | None = None,
+    *,
+    until_over: bool = False,
+) -> tuple[Macro, ...]:
+    """Return the macro program of an impact.
 
-    def with_program(self, deck: Deck, dt: float, duration: float | None) -> Deck:
-        """Return the deck with its program. By default it ends once the impact is over.
+    By default it stores ply stresses in `elements` elements; None stores no ply stresses.
+    `until_over` ends it once the impact is over, after at most EXTENDED times the duration.
+    """
+    steps = max(1, math.ceil(duration / dt - 1e-9))
+    rows = options.every if options.every is not None else max(1, steps // ROWS)
+    words = {"LMAS": 0.0, "DT": dt, "LOOP": float(steps), "TIME": 0.0}
+    words |= {"RODP": float(rows), "DISP": float(rows), "NEXT": 0.0}
+    macros = [Macro(word, value=value) for word, value in words.items()]
+    failure = deck.has(Allowables) if options.failure is None else options.failure
+    plies = options.plies
+    if plies is None and elements is not None:
+        plies = (steps_of_plies(steps, rows), elements)
+    macros = list(with_outputs(macros, failure=failure, plies=plies))
+    if until_over:
+        macros[2] = Macro("LOOP", value=float(EXTENDED * steps))
+        macros.insert(-1, Macro("OVER", value=float(max(1, steps // TESTS))))
+    return tuple(macros)
 
-        With `damage` and strengths the program also stores ply stresses around the load.
-        """
-        with_plies = self.damage and deck.has(Allowables)
-        elements, until_over = None, duration is None
-        if duration is None or with_plies:
-            loaded = load_deck(replace(deck, macros=self.program(deck, dt, dt)))
-            if loaded.errors():  # the deck is refused later
-                return replace(deck, macros=self.program(deck, dt, duration or dt))
-            (problem,) = loaded.problems
-            duration = contact_duration(problem) if duration is None else duration
-            elements = elements_around_load(problem) if with_plies else None
-        macros = self.program(deck, dt, duration, elements, until_over=until_over)
-        return replace(deck, macros=macros)
+
+def with_impact_program(
+    options: ImpactOptions, deck: Deck, dt: float, duration: float | None
+) -> Deck:
+    """Return the deck with its program. By default it ends once the impact is over.
+
+    With `damage` and strengths the program also stores ply stresses around the load.
+    """
+    with_plies = options.damage and deck.has(Allowables)
+    elements, until_over = None, duration is None
+    if duration is None or with_plies:
+        loaded = load_deck(replace(deck, macros=program(options, deck, dt, dt)))
+        if loaded.errors():  # the deck is refused later
+            return replace(deck, macros=program(options, deck, dt, duration or dt))
+        (problem,) = loaded.problems
+        duration = contact_duration(problem) if duration is None else duration
+        elements = elements_around_load(problem) if with_plies else None
+    macros = program(options, deck, dt, duration, elements, until_over=until_over)
+    return replace(deck, macros=macros)
 
 
 def elements_around_load(problem: Problem) -> int:
@@ -140,12 +130,6 @@ def elements_around_load(problem: Problem) -> int:
     return min(max(near, FEWEST_ELEMENTS), problem.deck.control.numel)
 
 
-Kinematics = Literal["auto", "linear", "von-karman"]
-AUTO_KINEMATICS: Kinematics = "auto"  # the static estimate of the deflection decides
-LINEAR: Kinematics = "linear"
-VON_KARMAN: Kinematics = "von-karman"
-
-LIMIT = LIMITS[InPlane.UNKNOWN]  # largest deflection over thickness of a linear plate with `auto`
 MOST_ELEMENTS = 20_000  # beyond this mesh size the static deflection would take seconds
 # Program of one short step, for checks before the choice of the time step.
 BRIEF = (
@@ -164,16 +148,6 @@ class SupportedDeck(NamedTuple):
     deck: model.Deck
     comment: str  # comment lines about a window
     notes: list[str]
-
-
-def kinematics_of(kinematics: Kinematics | None, nonlinear: bool | None) -> Kinematics:
-    """Combine both options for the kinematics; raise ObjectError if they contradict each other."""
-    if nonlinear is None:
-        return kinematics or AUTO_KINEMATICS
-    named = VON_KARMAN if nonlinear else LINEAR
-    if kinematics in (None, named):
-        return named
-    raise ObjectError(f"`kinematics` is {kinematics}, and `nonlinear` means {named}: give one")
 
 
 def with_kinematics(

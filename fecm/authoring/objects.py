@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from fecm._errors import warn
 from fecm.authoring.contact import AnyContact, Sphere, indentation_law
-from fecm.authoring.impact import AnyProjectile, doubts_of_core
+from fecm.authoring.deck_options import AnyProjectile
 from fecm.authoring.laminate import (
     Bound,
     DeckPlies,
@@ -18,6 +18,7 @@ from fecm.authoring.laminate import (
     toughness_of,
 )
 from fecm.authoring.mesh import MembraneSupport, place_impact, support_plate
+from fecm.authoring.new_deck import doubts_of_core
 from fecm.authoring.parameters import ObjectError, check_kind
 from fecm.authoring.plate import Plate
 from fecm.authoring.plates import swapped

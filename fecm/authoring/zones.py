@@ -77,7 +77,7 @@ def _elements_of_group(mesh: AnyMesh, name: str) -> Indices:
     if name not in surfaces:
         existing = f"its groups of elements are {', '.join(sorted(surfaces))}"
         raise ObjectError(
-            f"`zone` {name!r} is neither a rectangle x0,y0,x1,y1 nor a group of the mesh; "
+            f"`zones` {name!r} is neither a rectangle x0,y0,x1,y1 nor a group of the mesh; "
             f"{existing if surfaces else 'it has no groups of elements'}"
         )
     return surfaces[name]
@@ -88,8 +88,8 @@ def _elements_of_rectangle(mesh: MeshArrays, place: Sequence[float], doubts: lis
     try:
         x0, y0, x1, y1 = map(float, place)
     except (TypeError, ValueError):
-        raise ObjectError(f"`zone` is at {place!r}, not x0, y0, x1 and y1 or a group") from None
-    zone = f"`zone` {x0:g},{y0:g},{x1:g},{y1:g}"
+        raise ObjectError(f"`zones` is at {place!r}, not x0, y0, x1 and y1 or a group") from None
+    zone = f"`zones` {x0:g},{y0:g},{x1:g},{y1:g}"
     if not (x0 < x1 and y0 < y1):
         raise ObjectError(f"{zone} is empty: x0 and y0 are its lower corner, x1 and y1 its upper")
     corners = mesh.coordinates[mesh.elements[:, :CORNERS] - 1]

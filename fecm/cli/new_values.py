@@ -9,12 +9,13 @@ from pathlib import Path
 import click
 
 from fecm.authoring.contact import Sphere
-from fecm.authoring.numerics import EQUI
+from fecm.authoring.deck_options import EQUI
 from fecm.authoring.plate import MOST
 from fecm.authoring.zones import Zone
 from fecm.cli.options import POSITIVE, Finite, list_of
 from fecm.deck.catalogue import CONTACTS, NamedContact
 from fecm.deck.layup import parse_plies
+from fecm.deck.macros import RowsOfPlies
 from fecm.deck.model import Ply
 from fecm.mechanics.projectile import RigidMass, Rod
 
@@ -81,6 +82,12 @@ def zone(text: str) -> Zone:
     if place.count(",") != 3:
         return place, plies
     return list_of("X0,Y0,X1,Y1", Finite(), [4])(place), plies
+
+
+def rows_of_plies(text: str) -> RowsOfPlies:
+    """Parse the steps between rows of ply stresses, and perhaps the number of elements."""
+    steps, *elements = list_of("N[,M]", click.IntRange(min=0), [1, 2])(text)
+    return (steps, elements[0]) if elements else steps or False
 
 
 def shear_factor(text: str) -> float | str:

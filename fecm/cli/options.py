@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from enum import StrEnum
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -71,19 +72,35 @@ def job_options(job: Any, **settings: Mapping[str, Any]) -> Callable[[Decorated]
             options = {name: values.pop(name) for name in declared}
             function(options=options, **values)
 
+        flags = {name: _flag(name, about) for name, (about, _) in declared.items()}
         for name, (about, default) in reversed(declared.items()):
-            command = _click_option(name, about, default, settings.get(name, {}))(command)
+            option = _click_option(name, about, default, settings.get(name, {}), flags)
+            command = option(command)
         return command
 
     return decorate
 
 
-def _click_option(name: str, about: Option, default: Any, settings: Mapping[str, Any]) -> Any:
-    """Return the option of click for an option of a job."""
-    flags = [about.flag or f"--{name.replace('_', '-')}"]
-    if about.flag == "-o":
-        flags.append("--output")
-    attributes: dict[str, Any] = {"help": about.help, "metavar": about.metavar}
+def _flag(name: str, about: Option) -> str:
+    """Return the flag of an option of a job."""
+    return about.flag or f"--{name.replace('_', '-')}"
+
+
+def _click_option(
+    name: str,
+    about: Option,
+    default: Any,
+    settings: Mapping[str, Any],
+    flags: Mapping[str, str],
+) -> Any:
+    """Return the option of click for an option of a job.
+
+    In its help, names of options in backquotes become their flags.
+    """
+    names = [flags[name], "--output"] if flags[name] == "-o" else [flags[name]]
+    text = f"{about.help}  [default: {about.default_text}]" if about.default_text else about.help
+    text = re.sub(r"`(\w+)`", lambda match: flags.get(match[1], match[0]), text)
+    attributes: dict[str, Any] = {"help": text, "metavar": about.metavar}
     if default is False:
         attributes["is_flag"] = True
     elif default == ():
@@ -96,12 +113,19 @@ def _click_option(name: str, about: Option, default: Any, settings: Mapping[str,
     attributes |= settings
     if attributes.get("multiple"):
         attributes["help"] += "  May be repeated."
-    return click.option(*flags, name, **attributes)
+    return click.option(*names, name, **attributes)
 
 
-def groups_of(job: Any, own_groups: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
-    """Return the options of a job by headings of the help page, before the command's own groups."""
-    groups: dict[str, list[str]] = {title: [] for title in own_groups}
+def groups_of(
+    job: Any,
+    own_groups: Mapping[str, Sequence[str]],
+    first: Mapping[str, Sequence[str]] = MappingProxyType({}),
+) -> dict[str, list[str]]:
+    """Return the options of a job by headings of the help page.
+
+    In each group the command's own options follow those of the job; those of `first` come before.
+    """
+    groups: dict[str, list[str]] = {title: [*first.get(title, ())] for title in own_groups}
     for name, (about, _) in declared_options(job).items():
         if about.group:
             groups[about.group].append(name)
@@ -355,7 +379,7 @@ class GroupedCommand(click.Command):
         sections = {
             title: [shown.pop(name) for name in names] for title, names in self._groups.items()
         }
-        sections["Other options"] = list(shown.values())
+        sections.setdefault("Other options", []).extend(shown.values())
         for title, records in sections.items():
             with formatter.section(title):
                 formatter.write_dl([record for record in records if record is not None])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from fecm._machine import NotEnoughMemoryError, available_memory, format_bytes, 
 from fecm._typing import AnyFile
 from fecm.deck.card import Card, CardSource, Control, capitals
 from fecm.deck.findings import CardPlace, DeckError
-from fecm.deck.macros import LoadTable, Macro
+from fecm.deck.macros import LoadTable, Macro, compile_program, with_outputs
 from fecm.deck.mesh_cards import DOF_NAMES, NODES_AN_ELEMENT
 from fecm.deck.model import END, MACROS, SEGMENTS, STOP, TITLE, Deck, Segment
 from fecm.deck.segment import CardStream
@@ -472,3 +472,38 @@ def read_deck(path_or_text: str | Path | AnyFile) -> Deck | list[Deck]:
     if reader.findings.errors:
         raise DeckError(list(reader.findings), name)
     return decks[0] if len(decks) == 1 else decks
+
+
+def with_program(
+    deck: Deck,
+    macros: str | Sequence[Macro] | None = None,
+    *,
+    every: int | None = None,
+    plies: int | bool | tuple[int, int] | None = None,
+    failure: int | bool | None = None,
+) -> Deck:
+    """Return a deck with another macro program; see :meth:`fecm.Deck.with_program`."""
+    if isinstance(macros, str):
+        deck = with_cards(deck, macros)
+    elif macros is not None:
+        deck = replace(deck, macros=tuple(macros))
+    program = with_outputs(deck.macros, every=every, plies=plies, failure=failure)
+    return replace(deck, macros=program, text="")
+
+
+def with_cards(deck: Deck, cards: str) -> Deck:
+    """Return the deck with another macro program: the cards between MACR and END.
+
+    END and the load tables of PROP may follow. Without END the load tables of the deck stay. Raises
+    DeckError if the cards are not a macro program.
+    """
+    lines = [TITLE, deck.control.to_card(), END, MACROS, *cards.rstrip("\n").split("\n")]
+    if END not in map(str.strip, lines[4:]):
+        lines += [END, *(table.to_card() for table in deck.tables)]
+    reader = Reader("\n".join([*lines, STOP, ""]))
+    decks = [problem.deck for problem in reader.problems() if problem.deck is not None]
+    for parsed in decks:
+        compile_program(parsed.macros, reader.findings)
+    if errors := reader.findings.errors:
+        raise DeckError(errors, "<macros>")
+    return replace(deck, macros=decks[0].macros, tables=decks[0].tables)
