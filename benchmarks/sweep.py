@@ -31,9 +31,9 @@ from run import seconds as processor_time
 
 import fecm
 from fecm.authoring.case import Case, Value
-from fecm.authoring.cases import parse_vary
 from fecm.authoring.values import apply_case
 from fecm.mechanics import kernels
+from fecm.sweeps.case_tables import parse_vary
 from fecm.sweeps.methods import _plate
 
 DECK = HERE.parent / "decks" / "impact-115.inp"

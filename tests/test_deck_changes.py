@@ -252,7 +252,11 @@ def test_a_nonlinear_deck_without_nonl_moves_as_the_deck_that_is_made_linear() -
 
 
 def test_the_type_of_the_values_has_every_name_that_can_be_given() -> None:
-    assert set(changes.Values.__annotations__) == {*NAMES, *changes.OBJECTS, changes.NONLINEAR}
+    assert set(changes.Values.__annotations__) == {
+        *NAMES,
+        *changes.Parts._fields,
+        changes.NONLINEAR,
+    }
     known = {"Plate": Plate, "Laminate": fecm.Laminate, "Support": Support}
     known |= {"AnyProjectile": fecm.Rod, "AnyContact": fecm.Contact}
     hints = get_type_hints(changes.Values, localns=known)

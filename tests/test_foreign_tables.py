@@ -12,10 +12,11 @@ import pytest
 import fecm
 from fecm import FecmWarning
 from fecm._measured_tables import read_table
-from fecm.authoring import CasesError, read_cases
+from fecm.authoring import CasesError
 from fecm.location import strain_table
 from fecm.results import measurement_of
 from fecm.studies import StudyError, pulse_of, read_test, recorded
+from fecm.sweeps import read_cases
 from tests.calls import assert_unusable, call
 from tests.decks import ROOT
 

@@ -10,7 +10,8 @@ import pytest
 import fecm._machine
 from fecm._machine import NotEnoughMemoryError
 from fecm._measured_tables import COPIES, FIELD_BYTES, LINE_BYTES, read_table
-from fecm.authoring import CasesError, read_cases
+from fecm.authoring import CasesError
+from fecm.sweeps import read_cases
 
 NAMES = ("velocity", "k", "alpha_p", "s_p", "q")
 
@@ -52,7 +53,7 @@ def test_a_table_of_short_lines_that_memory_does_not_hold_is_refused(
 def test_a_table_of_too_many_cases_is_refused_before_its_fields_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fecm.authoring.cases.MOST_CASES", 10)
+    monkeypatch.setattr("fecm.sweeps.case_tables.MOST_CASES", 10)
     path = table(tmp_path / "cases.csv", 11, 1, "2")
     with pytest.raises(CasesError, match="has 12 lines; at most 11 are allowed"):
         read_cases(path)

@@ -12,7 +12,7 @@ import pytest
 
 import fecm
 from fecm import RigidMass
-from fecm.authoring import CasesError, impacts_from_cards, strike_of
+from fecm.authoring import CasesError, strike_of
 from fecm.mechanics import HystereticLaw, LinearPermanent, ReducedPlate
 from fecm.problem import load_deck
 from fecm.results import RATIO
@@ -24,6 +24,7 @@ from fecm.sweeps import (
     by_halvings,
     count_held,
     execute,
+    impacts_from_cards,
     tasks,
 )
 from fecm.sweeps.plan import plan

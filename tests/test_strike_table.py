@@ -7,8 +7,8 @@ import pytest
 
 import fecm
 from fecm import Deck
-from fecm.authoring import Case, Strike, impacts, strike_of_case
-from fecm.sweeps import backends
+from fecm.authoring import Case, Strike, strike_of_case
+from fecm.sweeps import backends, impact_columns
 from tests.decks import model, small
 
 ROD = small()
@@ -52,7 +52,7 @@ def test_a_sweep_is_that_of_strikes_made_one_by_one(
 ) -> None:
     text, vary = SWEEPS[name]
     found = sweep(text, vary)
-    monkeypatch.setattr(impacts, "_from_values", lambda *_: None)
+    monkeypatch.setattr(impact_columns, "_from_values", lambda *_: None)
     wanted = sweep(text, vary)
     assert not wanted.completed.all()
     assert wanted.completed.any() or "rod_length" in vary
@@ -66,7 +66,7 @@ def test_valid_cases_of_a_plate_need_no_cards(monkeypatch: pytest.MonkeyPatch) -
         made.append(case)
         return strike_of_case(plate, case)
 
-    monkeypatch.setattr(impacts, "strike_of_case", counted)
+    monkeypatch.setattr(impact_columns, "strike_of_case", counted)
     vary = {"velocity": np.linspace(60.0, 115.0, 8).tolist(), "k": np.linspace(1e6, 2e6, 8)}
     assert sweep(ROD, {**vary, "k": vary["k"].tolist()}).completed.all()
     assert len(made) <= 6  # of 64: those that are checked, and one asked for a law of the user's

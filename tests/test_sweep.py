@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm import ContactPoint, SweepResult
-from fecm.authoring import Case, CasesError, apply_case, grid_cases, parse_vary, read_cases
+from fecm.authoring import Case, CasesError, apply_case
 from fecm.deck import Deck
 from fecm.mechanics import AppliedForce, HystereticLaw, LinearPermanent, stack_parameters
 from fecm.problem import build_law, build_model, build_projectile, load_deck, sole_problem
@@ -36,8 +36,11 @@ from fecm.sweeps import (
     Task,
     carry_out_plan,
     execute,
+    grid_cases,
     on_workers,
+    parse_vary,
     plate_response,
+    read_cases,
     shares_plate,
     tasks,
 )

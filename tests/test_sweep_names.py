@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.authoring import VARIABLES, Case, CasesError, Changes, apply_case, parse_vary, read_cases
+from fecm.authoring import VARIABLES, Case, CasesError, Changes, apply_case
 from fecm.deck import Deck, Impact, Indentation, Material, Patch
 from fecm.problem.generate import generate
 from fecm.results import ALL_CRITERIA, largest_exposures
-from fecm.sweeps import methods, sweep_summary
+from fecm.sweeps import methods, parse_vary, read_cases, sweep_summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, model, small
 

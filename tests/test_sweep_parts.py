@@ -19,7 +19,7 @@ import pytest
 
 import fecm
 from fecm._files import OutputError, beside
-from fecm.authoring import grid_cases, with_time_step
+from fecm.authoring import with_time_step
 from fecm.problem import sole_problem
 from fecm.sweeps import (
     LOST,
@@ -31,6 +31,7 @@ from fecm.sweeps import (
     Task,
     carry_out_plan,
     execute,
+    grid_cases,
     run_task,
     tasks,
 )

@@ -5,26 +5,69 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import Any, NamedTuple, TypedDict
 
+from fecm._errors import warn
 from fecm.authoring.case import Case, CasesError, check_deck
-from fecm.authoring.cases import checked
-from fecm.authoring.parameters import in_units
-from fecm.authoring.timing import clock_of, with_clock
-from fecm.authoring.values import NAMES, apply_case, check_known, dimension_of
-from fecm.deck.catalogue import system_of
+from fecm.authoring.contact import AnyContact, Sphere, doubts_of_core, indentation_law
+from fecm.authoring.deck_options import AnyProjectile
+from fecm.authoring.laminate import (
+    Bound,
+    DeckPlies,
+    Laminate,
+    cure_segment,
+    deck_plies,
+    strengths_of,
+    toughness_of,
+)
+from fecm.authoring.mesh import MembraneSupport, place_impact, support_plate
+from fecm.authoring.parameters import ObjectError, check_kind, in_units
+from fecm.authoring.plate import Plate, Support
+from fecm.authoring.plate_values import swapped
+from fecm.authoring.strike_values import strike_of, struck_layers
+from fecm.authoring.time_values import clock_of, with_clock
+from fecm.authoring.values import NAMES, apply_case, check_known, dimension_of, value_of
+from fecm.deck import model
+from fecm.deck.catalogue import STANDARD, named_ply, system_of
+from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Deck, Nonlinear
 from fecm.deck.quantities import EXAMPLES, text_of
-
-if TYPE_CHECKING:
-    from fecm.authoring.contact import AnyContact
-    from fecm.authoring.deck_options import AnyProjectile
-    from fecm.authoring.laminate import Laminate
-    from fecm.authoring.plate import Plate, Support
+from fecm.problem.parts import is_coupled, is_curved
 
 Number = float | str  # a number, or its text
-OBJECTS = ("plate", "laminate", "projectile", "contact")
 NONLINEAR = "nonlinear"
+
+
+class Parts(NamedTuple):
+    """New parts of a deck. None keeps a part of the deck."""
+
+    plate: Plate | None = None
+    laminate: Laminate | None = None
+    projectile: AnyProjectile | None = None
+    contact: AnyContact | None = None
+
+    def check(self) -> None:
+        """Raise ObjectError if a part is not an object of fecm."""
+        if self.plate is not None:
+            check_kind("plate", self.plate, Plate)
+        if self.laminate is not None:
+            check_kind("laminate", self.laminate, Laminate)
+        if self.projectile is not None:
+            check_kind("projectile", self.projectile, AnyProjectile)
+        if self.contact is not None:
+            check_kind("contact", self.contact, AnyContact)
+
+    def with_plate(self, deck: model.Deck, at: tuple[float, float] | None) -> model.Deck:
+        """Return the deck with the new laminate and plate; the projectile hits a point."""
+        if self.laminate is not None:
+            deck = with_laminate(deck, self.laminate)
+        return deck if self.plate is None else with_plate(deck, self.plate, at)
+
+    def with_strike(self, deck: model.Deck) -> model.Deck:
+        """Return the deck with the new projectile and contact."""
+        if self.projectile is not None:
+            deck = with_projectile(deck, self.projectile)
+        return deck if self.contact is None else with_contact(deck, self.contact)
 
 
 class Values(TypedDict, total=False):
@@ -91,21 +134,17 @@ def with_values(deck: Deck, values: Mapping[str, Any]) -> Deck:
     Raises CasesError if a name is unknown or a value is invalid, and ObjectError if an object is.
     """
     for name in values:
-        check_known(name, "with_", (*OBJECTS, NONLINEAR, *NAMES))
+        check_known(name, "with_", (*Parts._fields, NONLINEAR, *NAMES))
     if NONLINEAR in values:
         deck = _with_kinematics(deck, nonlinear=values[NONLINEAR])
-    parts = {name: value for name, value in values.items() if name in OBJECTS}
-    not_values = (*OBJECTS, NONLINEAR)
+    parts = {name: value for name, value in values.items() if name in Parts._fields}
+    not_values = (*Parts._fields, NONLINEAR)
     numbers = _in_deck_units(deck, {n: value for n, value in values.items() if n not in not_values})
-    (case,) = checked([numbers], "with_")
-    objects = None
-    if parts:
-        from fecm.authoring.objects import Objects  # takes 30 ms; values do not need it
-
-        objects = Objects(**parts)
-        objects.check()
+    case = {name: value_of(name, value, "with_") for name, value in numbers.items()}
+    new_parts = Parts(**parts)
+    new_parts.check()
     try:
-        changed = apply_case(deck, case, objects)
+        changed = apply_case(deck, case, new_parts)
     except LookupError as error:  # the deck lacks the segment of a value
         raise CasesError(f"with_: {error}") from None
     is_new = "plate" in parts or "laminate" in parts
@@ -150,3 +189,132 @@ def _update_time_step(deck: Deck, changed: Deck, case: Case) -> Deck:
         if (clock := clock_of(check_deck(deck))) is not None:
             return with_clock(changed, clock, case).deck
     return changed
+
+
+# Parts --------------------------------------------------------------------------------------------
+
+# Segments of a mesh and its supports.
+OF_MESH: tuple[type[model.Segment], ...] = (model.Coordinates, model.Elements, model.Boundary)
+
+
+def with_projectile(deck: model.Deck, projectile: AnyProjectile) -> model.Deck:
+    """Return the deck with another projectile; a rod keeps the node of the transducer."""
+    if isinstance(projectile, model.Projectile):
+        return swapped(deck, deck.last(model.Projectile), projectile)
+    return strike_of(deck).with_projectile(projectile).deck()
+
+
+def with_contact(deck: model.Deck, contact: AnyContact) -> model.Deck:
+    """Return the deck with another contact law, or with an estimate for its laminate."""
+    plies = plies_of_deck(deck)
+    elastic = isinstance(contact, Sphere) and contact.modulus is not None
+    if plies.system is None and not elastic and not isinstance(contact, model.Indentation):
+        raise ObjectError("`contact` needs the units of the deck: give it a UNIT segment")
+    struck = struck_layers(deck)
+    law, comment = indentation_law(contact, plies, struck)
+    for doubt in doubts_of_core(plies, struck) if comment else []:
+        warn(doubt)
+    return swapped(deck, deck.last(model.Indentation), law)
+
+
+def with_laminate(deck: model.Deck, laminate: Laminate) -> model.Deck:
+    """Return the deck with another laminate; strengths of the new plies replace existing ones."""
+    _refuse_segments(deck, "laminate", model.Laminates, model.Zones)
+    system = system_of(deck)
+    plies, _ = deck_plies(laminate, (), system, [])
+    if system is None and plies.named:
+        raise ObjectError("`laminate` has a named ply: the deck needs a UNIT segment to convert it")
+    material, *further = plies.segments()
+    assert isinstance(material, model.Material)
+    replaced = deck.require(model.Material)
+    integration = replace(replaced.integration, thickness=plies.thickness, source=None)
+    changed = swapped(deck, replaced, replace(material, integration=integration))
+    kept = [segment for segment in changed.segments if not isinstance(segment, model.Materials)]
+    control = replace(deck.control, layers=len(material.layers), source=None)
+    changed = replace(changed, control=control, segments=(*kept, *further))
+    constants = dict(enumerate((bound.ply for bound in plies.materials), start=MATERIAL))
+    return changed if constants == deck.plies else _with_properties(changed, plies)
+
+
+def _with_properties(deck: model.Deck, plies: DeckPlies) -> model.Deck:
+    """Replace the strengths, toughness and expansions of a deck by the values of new plies."""
+    segments: list[model.Segment] = []
+    try:
+        for segment in deck.segments:
+            match segment:
+                case model.Allowables():
+                    segments.append(strengths_of(plies))
+                case model.Delamination():
+                    segments.append(replace(segment, toughness=toughness_of(plies), source=None))
+                case model.Cure(delta_t=change) if segment.delta_c == 0.0:
+                    segments.append(cure_segment(plies, change) or segment)
+                case model.Cure():
+                    raise ObjectError("a named ply has no expansion by moisture")
+                case _:
+                    segments.append(segment)
+    except ObjectError as error:
+        raise ObjectError(
+            "`laminate` has other plies; the deck needs their strengths, toughness or "
+            f"expansions in place of its own: {error}"
+        ) from None
+    return replace(deck, segments=tuple(segments))
+
+
+def with_plate(deck: model.Deck, plate: Plate, at: tuple[float, float] | None) -> model.Deck:
+    """Return the deck with another mesh and its supports.
+
+    The projectile hits the point `at`, by default the middle of the plate.
+    """
+    _refuse_segments(deck, "plate", model.Forces, model.Zones)
+    test = plate.fixture.test if plate.fixture else None
+    if test is not None and system_of(deck) != STANDARD:
+        raise ObjectError(f"`plate`: the fixture's standard is in {STANDARD}, and the deck is not")
+    old_patch, doubts = deck.last(model.Patch), list[str]()
+    patch = None if old_patch is None else replace(old_patch, x=None, y=None, source=None)
+    mesh, node, patch, point = place_impact(plate, plies_of_deck(deck), at, patch, doubts)
+    stretches = deck.has(model.Nonlinear) or is_coupled(deck)
+    membrane = MembraneSupport.of(curved=is_curved(deck), stretches=stretches)
+    boundary, _ = support_plate(plate, mesh, None, [], membrane)
+    for doubt in doubts:
+        warn(doubt)
+    control = replace(
+        deck.control,
+        numnp=mesh.nodes,
+        numel=mesh.elements,
+        nen=mesh.most_nodes,
+        source=None,
+    )
+    kept = tuple(segment for segment in deck.segments if not isinstance(segment, OF_MESH))
+    supports = () if boundary is None else (boundary,)
+    changed = replace(
+        deck,
+        control=control,
+        segments=(mesh.coordinates(), mesh.element_cards(), *supports, *kept),
+    )
+    strike = deck.last(model.Impact)
+    if old_patch is not None and patch is not None:
+        if strike is None:
+            patch = patch.centred(point)
+        changed = swapped(changed, old_patch, patch)
+    if strike is not None:
+        changed = swapped(changed, strike, replace(strike, node=node, source=None))
+    return changed
+
+
+def _refuse_segments(deck: model.Deck, name: str, *kinds: type[model.Segment]) -> None:
+    """Raise ObjectError if the deck has segments that refer to the part to be replaced."""
+    if keywords := [kind.keyword for kind in kinds if deck.has(kind)]:
+        raise ObjectError(
+            f"`{name}` can't be replaced in a deck with {' and '.join(keywords)}, which would then "
+            "not fit"
+        )
+
+
+def plies_of_deck(deck: model.Deck) -> DeckPlies:
+    """Return the laminates and materials of a deck, with the names of named plies."""
+    system, plies = system_of(deck), deck.plies
+    first = plies[MATERIAL]
+    numbers = range(MATERIAL, max(plies) + 1)
+    materials = [plies.get(number, first) for number in numbers]
+    bound = tuple(Bound(ply, named_ply(ply, system)) for ply in materials)
+    return DeckPlies(tuple(deck.layers.values()), bound, system)

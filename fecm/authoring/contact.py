@@ -20,6 +20,7 @@ from fecm.deck.model import Indentation, Layer, Patch
 from fecm.deck.units import MODULUS, convert, in_si, units_of
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
+from fecm.mechanics.laminate import are_cores
 from fecm.mechanics.points import DISC, HERTZ
 from fecm.problem.rules.units import USED, likely_unit, needed_unit
 
@@ -232,3 +233,18 @@ def indentation_law(
             return contact.converted(plies.system), ""
         case None:
             raise ObjectError(f"give `contact`, a law or one of {', '.join(CONTACTS)}")
+
+
+def is_sandwich(plies: DeckPlies, layers: Sequence[Layer]) -> bool:
+    """Return whether a layer is the core of a sandwich: it is very soft in shear."""
+    return any(are_cores([plies.of(layer).ply for layer in layers]))
+
+
+def doubts_of_core(plies: DeckPlies, layers: Sequence[Layer]) -> list[str]:
+    """Return a doubt about an estimated k of a sandwich."""
+    if not is_sandwich(plies, layers):
+        return []
+    return [
+        "k is estimated of a sandwich, as if its core were spread over the thickness; its face "
+        "indents into the core, and the core is crushed: measure the law (`law`)"
+    ]

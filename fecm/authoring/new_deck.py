@@ -13,9 +13,11 @@ from fecm._errors import warn
 from fecm._options import with_parameters_of
 from fecm.authoring.contact import (
     Sphere,
+    doubts_of_core,
     doubts_of_soft_tip,
     doubts_of_sphere,
     indentation_law,
+    is_sandwich,
 )
 from fecm.authoring.deck_options import (
     AnyProjectile,
@@ -67,7 +69,6 @@ from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Control, Gage
 from fecm.deck.reader import with_cards
 from fecm.deck.units import MODULUS, TOUGHNESS, quantity, unit_of, units_of
-from fecm.mechanics.laminate import are_cores
 from fecm.mechanics.points import RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.loading import load_deck
@@ -403,21 +404,6 @@ def with_supports(
         place = next(n for n, part in enumerate(segments) if isinstance(part, later))
         segments.insert(place, model.Nonlinear())
     return SupportedDeck(replace(plain, segments=tuple(segments)), comment, notes)
-
-
-def is_sandwich(plies: DeckPlies, layers: Sequence[model.Layer]) -> bool:
-    """Return whether a layer is the core of a sandwich: it is very soft in shear."""
-    return any(are_cores([plies.of(layer).ply for layer in layers]))
-
-
-def doubts_of_core(plies: DeckPlies, layers: Sequence[model.Layer]) -> list[str]:
-    """Return a doubt about an estimated k of a sandwich."""
-    if not is_sandwich(plies, layers):
-        return []
-    return [
-        "k is estimated of a sandwich, as if its core were spread over the thickness; its face "
-        "indents into the core, and the core is crushed: measure the law (`law`)"
-    ]
 
 
 def _doubts_of_duration(duration: float | None, dt: float, system: str | None) -> list[str]:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 import numpy as np
 
 from fecm._errors import did_you_mean
-from fecm.authoring import plates, strike
+from fecm.authoring import plate_values as plate
+from fecm.authoring import strike_values as strike
 from fecm.authoring.case import (
     PAIRS,
     Case,
@@ -26,9 +27,9 @@ from fecm.authoring.case import (
     pair_of_text,
 )
 from fecm.authoring.parameters import ObjectError, in_units
-from fecm.authoring.plates import PlateSetter, check_free_in_plane, free_in_plane
-from fecm.authoring.strike import Strike, StrikeSetter, strike_of
-from fecm.authoring.timing import stable_time_step, with_time_step
+from fecm.authoring.plate_values import PlateSetter, check_free_in_plane, free_in_plane
+from fecm.authoring.strike_values import Strike, StrikeSetter, strike_of
+from fecm.authoring.time_values import stable_time_step, with_time_step
 from fecm.deck.grid import SUPPORTS
 from fecm.deck.model import Deck
 from fecm.deck.quantities import EXAMPLES, NUMBER, text_of
@@ -37,7 +38,7 @@ from fecm.problem.parts import is_coupled, is_curved
 from fecm.results.metrics import COLUMNS, VERDICTS
 
 if TYPE_CHECKING:
-    from fecm.authoring.objects import Objects
+    from fecm.authoring.changes import Parts
 
 _Setter = TypeVar("_Setter", PlateSetter, StrikeSetter, None)
 
@@ -127,65 +128,65 @@ STRIKE_VALUES: tuple[SweepValue[StrikeSetter], ...] = (
              meaning="toughness G_IIc of `DELA`; only the delamination threshold depends on it"),
 )
 PLATE_VALUES: tuple[SweepValue[PlateSetter], ...] = (
-    SweepValue("at", Changes.PLACE, "", plates.set_place, ValueKind.TEXT,
+    SweepValue("at", Changes.PLACE, "", plate.set_place, ValueKind.TEXT,
              meaning="[impact point](#impact-point) `(x,y)`"),
-    SweepValue("impact_node", Changes.PLACE, "", plates.set_impact_node, ValueKind.INTEGER,
+    SweepValue("impact_node", Changes.PLACE, "", plate.set_impact_node, ValueKind.INTEGER,
              meaning="node of `ROD`"),
-    SweepValue("patch", Changes.PLACE, "length", plates.patch_field("radius"),
+    SweepValue("patch", Changes.PLACE, "length", plate.patch_field("radius"),
              meaning="radius of the patch (`PATC`; a deck without one gets a disc at the impact "
                      "node)"),
-    SweepValue("x0", Changes.PLACE, "length", plates.patch_field("x"),
+    SweepValue("x0", Changes.PLACE, "length", plate.patch_field("x"),
              meaning="centre of the patch; with `y0`, unless the deck gives that"),
-    SweepValue("y0", Changes.PLACE, "length", plates.patch_field("y"),
+    SweepValue("y0", Changes.PLACE, "length", plate.patch_field("y"),
              meaning="centre of the patch; with `x0`, unless the deck gives that"),
-    SweepValue("laminate_thickness", Changes.LAMINATE, "length", plates.set_thickness,
+    SweepValue("laminate_thickness", Changes.LAMINATE, "length", plate.set_thickness,
              meaning="thickness of the laminate; every ply is scaled"),
-    SweepValue("ply_thickness", Changes.LAMINATE, "length", plates.set_ply_thickness,
+    SweepValue("ply_thickness", Changes.LAMINATE, "length", plate.set_ply_thickness,
              meaning="thickness of every ply; all plies have the same"),
-    SweepValue("thickness", Changes.LAMINATE, "length", plates.set_thickness,
+    SweepValue("thickness", Changes.LAMINATE, "length", plate.set_thickness,
              meaning="the same as `laminate_thickness`"),
-    SweepValue("density", Changes.LAMINATE, _DENSITY, plates.ply_property("density"),
+    SweepValue("density", Changes.LAMINATE, _DENSITY, plate.ply_property("density"),
              meaning="density of the ply of `MATE`"),
-    SweepValue("nu12", Changes.LAMINATE, "", plates.ply_property("nu12"),
+    SweepValue("nu12", Changes.LAMINATE, "", plate.ply_property("nu12"),
              meaning="Poisson's ratio of the ply"),
-    SweepValue("e1", Changes.LAMINATE, _STRESS, plates.ply_property("e1"),
+    SweepValue("e1", Changes.LAMINATE, _STRESS, plate.ply_property("e1"),
              meaning="Young's modulus of the ply along the fibres"),
-    SweepValue("e2", Changes.LAMINATE, _STRESS, plates.ply_property("e2"),
+    SweepValue("e2", Changes.LAMINATE, _STRESS, plate.ply_property("e2"),
              meaning="Young's modulus of the ply across the fibres"),
-    SweepValue("g12", Changes.LAMINATE, _STRESS, plates.ply_property("g12"),
+    SweepValue("g12", Changes.LAMINATE, _STRESS, plate.ply_property("g12"),
              meaning="shear modulus in the plane of the ply"),
-    SweepValue("g13", Changes.LAMINATE, _STRESS, plates.ply_property("g13"),
+    SweepValue("g13", Changes.LAMINATE, _STRESS, plate.ply_property("g13"),
              meaning="transverse shear modulus along the fibres"),
-    SweepValue("g23", Changes.LAMINATE, _STRESS, plates.ply_property("g23"),
+    SweepValue("g23", Changes.LAMINATE, _STRESS, plate.ply_property("g23"),
              meaning="transverse shear modulus across the fibres"),
-    SweepValue("layup", Changes.LAMINATE, "", plates.set_layup, ValueKind.TEXT,
+    SweepValue("layup", Changes.LAMINATE, "", plate.set_layup, ValueKind.TEXT,
              meaning="[layup](making.md#layups), with the ply thickness of the deck"),
-    SweepValue("layer_materials", Changes.LAMINATE, "", plates.set_layer_materials, ValueKind.TEXT,
+    SweepValue("layer_materials", Changes.LAMINATE, "", plate.set_layer_materials, ValueKind.TEXT,
              meaning="numbers of the materials of the layers, written as a layup's angles: "
                      "`[1/2]s`; `layup` keeps each layer's"),
-    SweepValue("angle", Changes.LAMINATE, "", plates.add_angle,
+    SweepValue("angle", Changes.LAMINATE, "", plate.add_angle,
              meaning="degrees added to the angle of every ply"),
-    SweepValue("preload_x", Changes.LAMINATE, "force/length", plates.preload_force("n_x"),
+    SweepValue("preload_x", Changes.LAMINATE, "force/length", plate.preload_force("n_x"),
              meaning="membrane force N0x of `PREL`, tension positive; a deck without `PREL` gets "
                      "one"),
-    SweepValue("preload_y", Changes.LAMINATE, "force/length", plates.preload_force("n_y"),
+    SweepValue("preload_y", Changes.LAMINATE, "force/length", plate.preload_force("n_y"),
              meaning="the same for N0y"),
-    SweepValue("preload_xy", Changes.LAMINATE, "force/length", plates.preload_force("n_xy"),
+    SweepValue("preload_xy", Changes.LAMINATE, "force/length", plate.preload_force("n_xy"),
              meaning="the same for N0xy"),
-    SweepValue("radius_x", Changes.LAMINATE, "length", plates.curvature_radius("radius_x"),
+    SweepValue("radius_x", Changes.LAMINATE, "length", plate.curvature_radius("radius_x"),
              meaning="radius of a [curved panel](curved.md) (`CURV`), 0 is flat; the deck leaves u "
                      "and v free"),
-    SweepValue("radius_y", Changes.LAMINATE, "length", plates.curvature_radius("radius_y"),
+    SweepValue("radius_y", Changes.LAMINATE, "length", plate.curvature_radius("radius_y"),
              meaning="the same for Ry"),
-    *(SweepValue(name, Changes.FAILURE, _STRESS, plates.strength(name),
+    *(SweepValue(name, Changes.FAILURE, _STRESS, plate.strength(name),
                meaning=f"{text} of the ply of `MATE` (`ALLO`); only exposures depend on it")
       for name, text in STRENGTHS.items()),
-    SweepValue("cure_dT", Changes.FAILURE, "", plates.set_cure,
+    SweepValue("cure_dT", Changes.FAILURE, "", plate.set_cure,
              meaning="change of temperature of `CURE`, K; only exposures depend on it"),
-    SweepValue("size", Changes.PLATE, "", plates.set_size, ValueKind.TEXT,
+    SweepValue("size", Changes.PLATE, "", plate.set_size, ValueKind.TEXT,
              meaning="`AxB`: sides of the plate; coordinates are scaled along x and y, and with "
                      "them the centre of the patch and the gages"),
-    SweepValue("support", Changes.PLATE, "", plates.set_support, ValueKind.TEXT,
+    SweepValue("support", Changes.PLATE, "", plate.set_support, ValueKind.TEXT,
              meaning="`free`, `simple`, `pinned` or `clamped`: [support](#supports-of-the-outline) "
                      "of the outline"),
 )
@@ -196,7 +197,7 @@ TIME_VALUES: tuple[SweepValue[None], ...] = (  # set together, after all other v
              meaning="simulated time, rounded up to a step"),
 )
 # fmt: on
-REFINEMENT = SweepValue("refine", Changes.PLATE, "", plates.refine)  # only for refinement studies
+REFINEMENT = SweepValue("refine", Changes.PLATE, "", plate.refine)  # only for refinement studies
 REFINE = REFINEMENT.name
 VARIABLES: dict[str, SweepValue[PlateSetter] | SweepValue[StrikeSetter] | SweepValue[None]] = {
     **{variable.name: variable for variable in STRIKE_VALUES},
@@ -376,7 +377,7 @@ _PLATE_SETTERS = _ordered_setters((REFINEMENT, *PLATE_VALUES))
 _STRIKE_SETTERS = _ordered_setters(STRIKE_VALUES)
 
 
-def apply_case(deck: Deck, case: Case, objects: Objects | None = None) -> Deck:
+def apply_case(deck: Deck, case: Case, objects: Parts | None = None) -> Deck:
     """Return a deck with new parts, `objects`, and then with the values of a case.
 
     A layup takes the ply thickness of the deck, so more plies give a thicker plate. The thickness

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.authoring.case import Case
-from fecm.authoring.impacts import impacts_from_cards
-from fecm.authoring.strike import Strike
+from fecm.authoring.strike_values import Strike
 from fecm.authoring.values import check_names, strike_of_case
 from fecm.deck.model import Deck
 from fecm.identification.alignment import IdentifyError, contact_points
@@ -22,6 +21,7 @@ from fecm.mechanics.contact_law import Law
 from fecm.results.comparison import Measurement
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter
+from fecm.sweeps.impact_columns import impacts_from_cards
 from fecm.sweeps.outcome import Backend, Outcome
 
 DELAY = "delay"  # measured time at which the projectile touches the plate

@@ -16,7 +16,7 @@ from fecm._options import described_by, documented, option
 from fecm._table import html_summary
 from fecm._typing import Floats
 from fecm._watch import SILENT, StoppedError, Watch
-from fecm.authoring.strike import lacks_value, strike_of
+from fecm.authoring.strike_values import lacks_value, strike_of
 from fecm.deck.model import Deck, Impact, Indentation, Nonlinear, Projectile
 from fecm.deck.units import unit_names
 from fecm.identification.alignment import IdentifyError, check_measured, lags

@@ -1,6 +1,9 @@
 """Names of this room for other rooms and for tests; each is imported when it is first used."""
 
 from fecm.sweeps.backends import shares_plate as shares_plate
+from fecm.sweeps.case_tables import grid_cases as grid_cases
+from fecm.sweeps.case_tables import parse_vary as parse_vary
+from fecm.sweeps.case_tables import read_cases as read_cases
 from fecm.sweeps.checks import ADVANCED_BYTES as ADVANCED_BYTES
 from fecm.sweeps.checks import HISTORY_BYTES as HISTORY_BYTES
 from fecm.sweeps.checks import JUDGED as JUDGED
@@ -13,6 +16,7 @@ from fecm.sweeps.execute import SchedulerError as SchedulerError
 from fecm.sweeps.execute import carry_out_plan as carry_out_plan
 from fecm.sweeps.execute import on_workers as on_workers
 from fecm.sweeps.files import save_sweep as save_sweep
+from fecm.sweeps.impact_columns import impacts_from_cards as impacts_from_cards
 from fecm.sweeps.in_full import without_output as without_output
 from fecm.sweeps.job import Sweep as Sweep
 from fecm.sweeps.methods import METHODS as METHODS

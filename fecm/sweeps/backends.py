@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from fecm._machine import require_memory
 from fecm._typing import Floats
-from fecm.authoring.impacts import Impacts
-from fecm.authoring.timing import lengthened
+from fecm.authoring.time_values import lengthened
 from fecm.deck.macros import flat
 from fecm.deck.model import Nonlinear
 from fecm.mechanics import kernels
@@ -29,6 +28,7 @@ from fecm.problem.problem import Problem
 from fecm.results.metrics import GAGE, Projectiles, impact_metrics
 from fecm.simulation.judge import ENERGY_WARNING
 from fecm.sweeps.checks import ADVANCED_BYTES
+from fecm.sweeps.impact_columns import Impacts
 from fecm.sweeps.in_full import (
     CasePeaks,
     judge_cases,

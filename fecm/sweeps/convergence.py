@@ -15,7 +15,7 @@ import numpy as np
 from fecm._table import aligned
 from fecm._typing import Floats
 from fecm.authoring.case import Case, CasesError
-from fecm.authoring.timing import stable_time_step
+from fecm.authoring.time_values import stable_time_step
 from fecm.authoring.values import REFINE, apply_case
 from fecm.deck.macros import flat
 from fecm.problem.problem import Problem

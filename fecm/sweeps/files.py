@@ -12,13 +12,13 @@ from fecm._errors import ResultFileError
 from fecm._files import beside
 from fecm._text import Decimal, csv_lines
 from fecm._typing import Floats
-from fecm.authoring.cases import CONVERTED, MEASURED
 from fecm.authoring.values import dimension_of
 from fecm.deck.units import column_name, unit_of
 from fecm.results import schema
 from fecm.results.groups import ExportError
 from fecm.results.metrics import VERDICTS
 from fecm.sweeps import reduced
+from fecm.sweeps.case_tables import CONVERTED, MEASURED
 from fecm.sweeps.distributions import CustomDistribution, ValueDistribution
 from fecm.sweeps.outcome import Column, Forces
 from fecm.sweeps.random import DESIGNS, Design, correlation_of

@@ -10,8 +10,8 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.authoring.case import Case, CasesError
-from fecm.authoring.strike import strike_of
-from fecm.authoring.timing import with_clock
+from fecm.authoring.strike_values import strike_of
+from fecm.authoring.time_values import with_clock
 from fecm.authoring.values import apply_case, name_fault
 from fecm.deck.macros import Body, Loop
 from fecm.deck.model import Deck, Macro

@@ -19,14 +19,7 @@ from fecm._files import beside, check_outputs
 from fecm._options import documented, option, with_parameters_of
 from fecm._table import Row, html_summary
 from fecm._watch import LOGGER, CallerWatch, Progress, Watch
-from fecm.authoring.case import Case, CasesError, Limit, parse_exceed
-from fecm.authoring.cases import (
-    CaseTable,
-    MeasuredColumn,
-    index_of,
-    table_of_cases,
-    texts_of,
-)
+from fecm.authoring.case import Case, CasesError
 from fecm.authoring.values import NAMES
 from fecm.deck.catalogue import system_of
 from fecm.mechanics.contact_law import Law
@@ -35,6 +28,13 @@ from fecm.problem.build import RunOptions
 from fecm.problem.loading import AnyDeck, LoadedDeck, load_deck, sole
 from fecm.problem.problem import Problem
 from fecm.simulation.job import Price, ProblemRun
+from fecm.sweeps.case_tables import (
+    CaseTable,
+    MeasuredColumn,
+    index_of,
+    table_of_cases,
+    texts_of,
+)
 from fecm.sweeps.checks import (
     check_sweep_memory,
     doubtful_values,
@@ -48,6 +48,7 @@ from fecm.sweeps.exclusions import check_options
 from fecm.sweeps.execute import LOST, Done, Means, SchedulerError, carry_out_plan
 from fecm.sweeps.files import write_sweep
 from fecm.sweeps.in_full import built, case_deck
+from fecm.sweeps.limits import Limit, parse_exceed
 from fecm.sweeps.outcome import Outcome, Status
 from fecm.sweeps.partial_results import PartialResults
 from fecm.sweeps.plan import plan

@@ -9,7 +9,7 @@ from pathlib import Path
 from fecm._typing import FiniteFloat
 from fecm._watch import Progress
 from fecm.authoring.case import CasesError, check_deck
-from fecm.authoring.timing import stable_time_step, with_time_step
+from fecm.authoring.time_values import stable_time_step, with_time_step
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck
 from fecm.listing.slips import Mode, active_slips

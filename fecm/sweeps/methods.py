@@ -18,10 +18,9 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm._watch import Watch
-from fecm.authoring.case import NO_THRESHOLD, PEAK_FORCE, THRESHOLD, Case, CasesError, Value
-from fecm.authoring.impacts import Impacts, impacts_from_cards, impacts_of
-from fecm.authoring.strike import strike_of
-from fecm.authoring.timing import with_clock
+from fecm.authoring.case import NO_THRESHOLD, Case, CasesError, Value
+from fecm.authoring.strike_values import strike_of
+from fecm.authoring.time_values import with_clock
 from fecm.authoring.values import FAILURE_NAMES, REFINE, apply_case
 from fecm.deck.model import Nonlinear
 from fecm.mechanics.kernels import LIBRARY
@@ -36,6 +35,7 @@ from fecm.sweeps.backends import (
     only_impacts,
     shares_plate,
 )
+from fecm.sweeps.impact_columns import Impacts, impacts_from_cards, impacts_of
 from fecm.sweeps.in_full import (
     as_run,
     problem_of_case,
@@ -45,6 +45,7 @@ from fecm.sweeps.in_full import (
     with_hit,
     without_output,
 )
+from fecm.sweeps.limits import PEAK_FORCE, THRESHOLD
 from fecm.sweeps.outcome import About, Backend, Outcome, Status, merge
 from fecm.sweeps.price import expected, work_of_plates, work_of_runs
 from fecm.sweeps.random import cost_of_plates, cost_of_runs

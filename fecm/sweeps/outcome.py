@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
-from fecm.authoring.impacts import Impacts
 from fecm.results.metrics import COLUMNS, SUMMARY, Metrics
 from fecm.results.validity import FAILED, VALID
+from fecm.sweeps.impact_columns import Impacts
 
 Column = NDArray[Any]  # of numbers or of texts
 Forces = tuple[Sequence[int], Floats | None]  # of cases, with contact forces (cases, steps)

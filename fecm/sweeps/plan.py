@@ -4,16 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-from fecm.authoring.case import (
-    NO_THRESHOLD,
-    THRESHOLD,
-    Case,
-    CasesError,
-    Limit,
-    check_limits,
-)
-from fecm.authoring.cases import MeasuredColumn
-from fecm.authoring.timing import clock_of
+from fecm.authoring.case import NO_THRESHOLD, Case, CasesError
+from fecm.authoring.time_values import clock_of
 from fecm.authoring.values import (
     FAILURE_NAMES,
     LAW_VALUES,
@@ -28,6 +20,8 @@ from fecm.mechanics.own_law import law_name
 from fecm.problem.problem import Problem
 from fecm.results.metrics import COLUMNS, FOUND, GAGE, SUMMARY
 from fecm.results.metrics import THRESHOLD as OF_THRESHOLD
+from fecm.sweeps.case_tables import MeasuredColumn
+from fecm.sweeps.limits import THRESHOLD, Limit, check_limits
 from fecm.sweeps.methods import method_of
 from fecm.sweeps.random import Design
 from fecm.sweeps.search import Search, Sought, Until, search_of

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from fecm._machine import free_processors
 from fecm.authoring.case import Case, CasesError
-from fecm.authoring.timing import duration_of
+from fecm.authoring.time_values import duration_of
 from fecm.authoring.values import REFINE
 from fecm.problem.problem import Problem
 from fecm.results.metrics import SUMMARY

@@ -19,9 +19,8 @@ from fecm._table import Row
 from fecm._typing import Floats, Indices
 from fecm._watch import Watch
 from fecm.authoring.case import CasesError
-from fecm.authoring.impacts import Impacts
-from fecm.authoring.strike import Strike
-from fecm.authoring.timing import duration_of
+from fecm.authoring.strike_values import Strike
+from fecm.authoring.time_values import duration_of
 from fecm.authoring.values import strike_of_case
 from fecm.mechanics.contact_law import ContactPoint
 from fecm.mechanics.impact import ContactState, couple_step
@@ -35,6 +34,7 @@ from fecm.mechanics.reduced_plate import (
 from fecm.problem.problem import Problem
 from fecm.results.metrics import RATIO, IndentationMetrics
 from fecm.results.schema import SWEEP_DATASETS
+from fecm.sweeps.impact_columns import Impacts
 from fecm.sweeps.outcome import About, Column, Outcome, merge
 from fecm.sweeps.responses import (
     BLOCK,

@@ -15,7 +15,6 @@ from fecm._files import check_outputs, open_for_writing
 from fecm._table import html_summary
 from fecm._text import Decimal
 from fecm._typing import AnyFile
-from fecm.authoring.cases import MEASURED
 from fecm.deck.model import Delamination
 from fecm.deck.units import declared_units, unit_names
 from fecm.mechanics.own_law import law_name
@@ -24,6 +23,7 @@ from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VERD
 from fecm.results.pictures import SweepKind, plot_results
 from fecm.results.written import Reported, Saved
 from fecm.sweeps import reduced as reduced_check
+from fecm.sweeps.case_tables import MEASURED
 from fecm.sweeps.files import FORCE, random_of
 from fecm.sweeps.outcome import About, Column, Outcome
 from fecm.sweeps.reduced import ReducedModel

@@ -11,19 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._typing import Bools, Floats
-from fecm.authoring.case import (
-    NO_THRESHOLD,
-    PEAK_FORCE,
-    THRESHOLD,
-    CasesError,
-    level_of,
-    parse_exceed,
-)
-from fecm.authoring.impacts import Impacts
+from fecm.authoring.case import NO_THRESHOLD, CasesError
 from fecm.deck.macros import EXTENDED
 from fecm.deck.model import Deck, Delamination, Impact
 from fecm.results.exposures import FEWEST
 from fecm.results.metrics import BAND, EVALUATIONS, EXPOSURES, FOUND_BAND
+from fecm.sweeps.impact_columns import Impacts
+from fecm.sweeps.limits import PEAK_FORCE, THRESHOLD, level_of, parse_exceed
 from fecm.sweeps.outcome import About, Backend, Outcome, merge
 
 Until = float | str | Mapping[str, float | str]  # what a search reaches; see :func:`search_of`
@@ -49,7 +43,7 @@ class Search(NamedTuple):
     """Search for the impact velocity at which a quantity reaches a level."""
 
     quantity: Sought
-    level: float | str  # a number, or of the peak force :data:`~fecm.authoring.case.THRESHOLD`
+    level: float | str  # a number, or of the peak force :data:`~fecm.sweeps.limits.THRESHOLD`
 
     def check(self, deck: Deck, names: Collection[str]) -> None:
         """Raise CasesError if the search is not possible in cases of a deck with these names."""

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from fecm._arrays import compared_by_identity
 from fecm._typing import Bools, Floats
-from fecm.authoring.case import THRESHOLD, Limit, check_limits
 from fecm.results.metrics import THRESHOLD_FORCE, VALIDITY, VERDICTS
 from fecm.results.validity import Reason
+from fecm.sweeps.limits import THRESHOLD, Limit, check_limits
 from fecm.sweeps.outcome import Column, Status, was_run
 from fecm.sweeps.random import REMEDY, Design
 

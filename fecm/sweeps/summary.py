@@ -12,7 +12,7 @@ from fecm._errors import ResultFileError
 from fecm._table import Row, label_lines
 from fecm._text import DIGITS, significant
 from fecm._typing import Bools
-from fecm.authoring.case import THRESHOLD, pair_of_text
+from fecm.authoring.case import pair_of_text
 from fecm.deck.model import Curvature, Delamination, Preload, Segment
 from fecm.deck.units import column_name, quantity
 from fecm.problem.generate import generate
@@ -32,6 +32,7 @@ from fecm.results.validity import (
     softness,
     unsafe,
 )
+from fecm.sweeps.limits import THRESHOLD
 from fecm.sweeps.outcome import Column
 from fecm.sweeps.random import pairs_of
 from fecm.sweeps.statistics import QUANTILES, RandomResult

@@ -18,15 +18,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fecm._version import __version__
 from fecm._watch import Watch
-from fecm.authoring.case import Case, Limit, Value
-from fecm.authoring.cases import MeasuredColumn
-from fecm.authoring.timing import Clock
+from fecm.authoring.case import Case, Value
+from fecm.authoring.time_values import Clock
 from fecm.authoring.values import OF_PLATE
 from fecm.deck.model import Deck
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import law_name
 from fecm.problem.problem import Problem
 from fecm.results.result import Result
+from fecm.sweeps.case_tables import MeasuredColumn
+from fecm.sweeps.limits import Limit
 from fecm.sweeps.outcome import Outcome, merge
 from fecm.sweeps.random import Design
 from fecm.sweeps.search import Search

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats, Indices
 from fecm.authoring.case import Case, CasesError
-from fecm.authoring.strike import Strike, strike_of
+from fecm.authoring.strike_values import Strike, strike_of
 from fecm.authoring.values import FAILURE_NAMES, OF_PLATE, strike_of_case
 from fecm.deck import model
 from fecm.deck.model import Deck

@@ -1,4 +1,4 @@
-"""Time step and duration of the decks of cases."""
+"""Values that change the time step and the duration of a deck."""
 
 from __future__ import annotations
 

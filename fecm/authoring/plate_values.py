@@ -1,4 +1,4 @@
-"""Setters for values that change the plate of a deck, its mesh or the impact point.
+"""Values that change the plate of a deck, its mesh or the impact point: their setters.
 
 A setter takes a deck and a value and returns the deck with the value. It raises CasesError if the
 value is invalid for the deck.

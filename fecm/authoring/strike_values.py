@@ -1,7 +1,7 @@
-"""Strike of a case: ROD, EXPE, PROJ, and DELA, whose threshold the force may reach.
+"""Values that change the strike of a deck: ROD, EXPE, PROJ and DELA.
 
-Values that only change the strike need no new deck. The cases of one plate differ in their strikes
-only.
+DELA has the threshold that the force may reach. Such values need no new deck. The cases
+of one plate differ in their strikes only.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar
 
 from fecm.authoring.case import NO_THRESHOLD, CasesError, Value, raise_first
-from fecm.authoring.plates import swapped
+from fecm.authoring.plate_values import swapped
 from fecm.deck import model
 from fecm.deck.catalogue import STANDARD, STEEL_MODULUS, STEEL_POISSON, nu23_of, system_of
 from fecm.deck.findings import Findings
