@@ -25,7 +25,7 @@ from typing import TypeVar
 
 from run import distorted, refined, time_step
 
-from fecm.deck import Deck
+from fecm.deck.model import Deck
 
 CASES: dict[str, Callable[[], Deck]] = {
     "14,000 equal": lambda: refined(10),

@@ -14,12 +14,12 @@ import sys
 from typing import Any, NamedTuple
 
 import fecm
-from fecm.mechanics import CircleStresses
-from fecm.problem import load_deck
+from fecm.mechanics.exposures import CircleStresses
 from fecm.problem.estimates import load_mesh
+from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
-from fecm.results import largest_exposures
 from fecm.results.exposure_bands import LoadMesh
+from fecm.results.exposures import largest_exposures
 
 
 class Case(NamedTuple):

@@ -15,9 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fecm.deck import Deck
 from fecm.deck.grid import ElementGrid, GridSection, uniform_section
-from fecm.deck.model import Indentation, Patch, Ply, Projectile, Shear
+from fecm.deck.model import Deck, Indentation, Patch, Ply, Projectile, Shear
 from fecm.plot import style
 from fecm.plot.kinds import Picture
 from fecm.plot.pictures import save_picture

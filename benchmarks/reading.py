@@ -22,7 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
 
 from run import distorted, refined
 
-from fecm.deck import Deck
+from fecm.deck.model import Deck
 from fecm.deck.reader import Reader
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.loading import load_deck, sole_problem

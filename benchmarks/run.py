@@ -36,13 +36,14 @@ import numpy as np
 from figures import keep
 
 import fecm
-from fecm.deck import Deck
+from fecm.deck.findings import Findings
 from fecm.deck.grid import ElementGrid, GridSection
 from fecm.deck.macros import compile_program
 from fecm.deck.model import (
     Boundary,
     Control,
     Coordinates,
+    Deck,
     Elements,
     Impact,
     Material,
@@ -217,7 +218,7 @@ def checked(deck: Deck, steps: int) -> Problem:
     values = {"LOOP": float(steps), "DT": time_step(deck)}
     macros = tuple(replace(m, value=values.get(m.word, m.value)) for m in deck.macros)
     cut = replace(deck, macros=macros)
-    return Problem(cut, generate(cut), compile_program(macros, fecm.deck.Findings()))
+    return Problem(cut, generate(cut), compile_program(macros, Findings()))
 
 
 class Plain:

@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fecm.deck import Shear
-from fecm.mechanics import HystereticLaw, StrainField, element_matrices, failure, strains
+from fecm.deck.model import Shear
+from fecm.mechanics import element_matrices, failure, strains
 from fecm.mechanics import laminate as laminates
+from fecm.mechanics.contact_law import HystereticLaw
+from fecm.mechanics.strains import StrainField
 
 Break = Callable[[pytest.MonkeyPatch], None]
 # What is broken; how; and the rows that have to see it: a case, and the beginnings of quantities.

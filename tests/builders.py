@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm import Ply
-from fecm.mechanics import IntegrationRules, LaminateSection, MeshArrays, RodState, gauss
-from fecm.mechanics.laminate import laminate
+from fecm.mechanics.element_matrices import IntegrationRules
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.mesh import MeshArrays
+from fecm.mechanics.projectile import RodState
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

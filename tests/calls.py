@@ -17,7 +17,7 @@ import pytest
 import fecm
 from fecm.cli import main
 from fecm.cli.interrupts import signals
-from fecm.deck import Deck
+from fecm.deck.model import Deck
 
 
 @dataclass(frozen=True)

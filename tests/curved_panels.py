@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from fecm.deck import ElementGrid, GridSection, model, uniform_section
+from fecm.deck import model
+from fecm.deck.grid import ElementGrid, GridSection, uniform_section
 from fecm.verification import decks
 
 PLY = model.Ply(1.57e-9, 0.32, 171420.0, 9080.0, 5290.0, 5290.0, 3242.9)

@@ -6,8 +6,9 @@ import re
 from pathlib import Path
 
 import fecm
-from fecm.deck import Deck
-from fecm.problem import ImpactModel, build_model, load_deck
+from fecm.deck.model import Deck
+from fecm.problem.build import ImpactModel, build_model
+from fecm.problem.loading import load_deck
 
 ROOT = Path(__file__).parent.parent
 DATA = Path(__file__).parent / "data"

@@ -16,8 +16,9 @@ import time
 from collections import Counter
 from types import FrameType
 
-from fecm.deck import Reader, format_deck
-from fecm.problem import load_deck
+from fecm.deck.format import format_deck
+from fecm.deck.reader import Reader
+from fecm.problem.loading import load_deck
 from tests.decks import APPENDIX, small
 
 SECONDS = 1.0

@@ -12,23 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from fecm import Deck, Ply
-from fecm.deck import (
-    ElementGrid,
-    ElementNodes,
-    Impact,
-    LoadTable,
-    Macro,
-    NodeValues,
-    Patch,
-    Projectile,
-    boundary_cards,
-    grid_lines,
-    model,
-    uniform_section,
-)
-from fecm.mechanics import critical_time_step, rounded_time_step
-from fecm.problem import build_plate
+from fecm.deck import model
+from fecm.deck.grid import ElementGrid, boundary_cards, grid_lines, uniform_section
+from fecm.deck.model import ElementNodes, Impact, LoadTable, Macro, NodeValues, Patch, Projectile
+from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
+from fecm.problem.parts import build_plate
 from fecm.verification import decks
 from tests.builders import Floats, Ints
 

@@ -11,17 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from fecm.mechanics import (
-    IntegrationRules,
-    LaminateSection,
-    MembraneForces,
-    MeshArrays,
-    PlateModel,
-    gauss,
-    interpolate,
-    patch_weights,
-    tangent_stiffness,
-)
+from fecm.mechanics.element_matrices import IntegrationRules
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.interpolation import interpolate
+from fecm.mechanics.laminate import LaminateSection
+from fecm.mechanics.membrane import MembraneForces
+from fecm.mechanics.mesh import MeshArrays
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.points import patch_weights
+from fecm.mechanics.solutions import tangent_stiffness
 from tests.builders import Bools, Floats, mesh_on, nothing, with_restraints
 
 Ints = NDArray[np.int32]

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fecm
-from fecm.deck import Gage, Gages, Segment, model
+from fecm.deck import model
+from fecm.deck.output_cards import Gage, Gages
+from fecm.deck.segment import Segment
 from tests.decks import DATA
 
 Floats = NDArray[np.float64]

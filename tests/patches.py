@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
-from fecm.mechanics import PlateModel
+from fecm.mechanics.plate import PlateModel
 from tests.builders import (
     Corners,
     Floats,

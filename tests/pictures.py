@@ -7,7 +7,8 @@ from typing import Any
 import fecm
 from fecm import Result
 from fecm._typing import Array
-from fecm.plot import KINDS, Shows, draw
+from fecm.plot.kinds import KINDS, Shows
+from fecm.plot.pictures import draw
 from tests.decks import DATA_CARDS, PROGRAM, small
 
 OF_RUNS = [name for name, kind in KINDS.items() if kind.shows in (Shows.RUN, Shows.RUNS)]

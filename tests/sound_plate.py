@@ -7,8 +7,8 @@ from collections.abc import Callable
 from functools import cache
 
 import fecm
-from fecm.deck import Finding
-from fecm.problem import load_deck
+from fecm.deck.findings import Finding
+from fecm.problem.loading import load_deck
 
 # Codes of the rules on test; that of the mesh, W415, depends on the decks' few elements.
 RULES = re.compile(

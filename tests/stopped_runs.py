@@ -5,11 +5,14 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from fecm.mechanics import AUTO
-from fecm.problem import Problem, RunOptions, load_deck
+from fecm.mechanics.stiffness_product import AUTO
+from fecm.problem.build import RunOptions
+from fecm.problem.loading import load_deck
+from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
-from fecm.simulation import Checkpointer, Simulation
-from fecm.simulation import run_program as simulate_run
+from fecm.simulation.checkpoint import Checkpointer
+from fecm.simulation.run import run_program as simulate_run
+from fecm.simulation.simulation import Simulation
 
 
 @cache

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck import DeckError
-from fecm.problem import deck_summary, load_deck
+from fecm.deck.findings import DeckError
+from fecm.problem.loading import load_deck
+from fecm.problem.summary import deck_summary
 from tests.decks import PROGRAM, small
 from tests.fuzz_decks import FORC, OWN
 

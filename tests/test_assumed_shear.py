@@ -9,16 +9,12 @@ import pytest
 from scipy import sparse
 from scipy.sparse.linalg import eigsh, spsolve
 
-from fecm.mechanics import (
-    IntegrationRules,
-    PlateModel,
-    StrainField,
-    element_blocks,
-    gauss,
-    interpolate,
-    nodal,
-    strain_matrix,
-)
+from fecm.mechanics.element_matrices import IntegrationRules
+from fecm.mechanics.elements import gauss, nodal
+from fecm.mechanics.interpolation import interpolate
+from fecm.mechanics.mesh import element_blocks
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.strains import StrainField, strain_matrix
 from tests.builders import (
     SKEWED,
     Floats,

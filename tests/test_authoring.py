@@ -10,31 +10,33 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fecm
-from fecm.deck import (
-    MATERIALS,
-    Allowables,
-    Control,
-    Deck,
-    Delamination,
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.format import format_deck
+from fecm.deck.grid import (
     ElementGrid,
-    Impact,
-    LayupError,
-    Material,
-    Patch,
-    Projectile,
-    Shear,
-    format_deck,
     graded,
     grid_lines,
     listed_sections,
     longest_at,
-    parse_layup,
     refined_sections,
     uniform_section,
 )
-from fecm.mechanics import critical_time_step
-from fecm.problem import build_projectile, load_deck
+from fecm.deck.layup import LayupError, parse_layup
+from fecm.deck.model import (
+    Allowables,
+    Control,
+    Deck,
+    Delamination,
+    Impact,
+    Material,
+    Patch,
+    Projectile,
+    Shear,
+)
+from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.generate import generate
+from fecm.problem.loading import load_deck
+from fecm.problem.parts import build_projectile
 from tests.calls import assert_unusable, call, new
 from tests.decks import APPENDIX, LONG, small
 
@@ -95,7 +97,7 @@ def test_a_new_deck_is_sound_and_declares_its_units() -> None:
     assert deck.require(Impact).node == 59  # the middle of 13 x 9 nodes
     dt = next(m.value for m in deck.macros if m.word == "DT")
     critical = load_deck(made.stdout).problems[0]
-    from fecm.problem import build_plate
+    from fecm.problem.parts import build_plate
 
     ratio = dt / critical_time_step(build_plate(critical.deck, critical.mesh))
     assert 0.8 < ratio <= 0.9

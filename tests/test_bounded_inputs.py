@@ -14,11 +14,11 @@ import pytest
 import fecm
 from fecm import FecmError, _inputs
 from fecm._inputs import InputError, parsed_toml, read_input
-from fecm.authoring import in_units
-from fecm.mechanics import coincident, representatives, sides_of_cells
-from fecm.problem import read_mesh
-from fecm.studies import recorded
-from fecm.sweeps import parse_vary
+from fecm.authoring.parameters import in_units
+from fecm.mechanics.joints import coincident, representatives, sides_of_cells
+from fecm.problem.plate_mesh import read_mesh
+from fecm.studies.rod_test.filters import recorded
+from fecm.sweeps.case_tables import parse_vary
 from tests.calls import call
 from tests.decks import LONG
 

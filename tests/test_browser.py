@@ -15,7 +15,8 @@ from pathlib import Path
 import pytest
 
 import fecm
-from fecm.report import page_of, render
+from fecm.report.content import render
+from fecm.report.report import page_of
 from tests.browser import Browser, find_browser
 from tests.calls import call
 from tests.decks import LONG, small

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fecm.studies import calibrate_transducer
+from fecm.studies.rod_test.pulse_test import calibrate_transducer
 from tests.calls import assert_unusable, call
 
 Floats = NDArray[np.float64]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from fecm.deck import Finding
-from fecm.problem import load_deck
+from fecm.deck.findings import Finding
+from fecm.problem.loading import load_deck
 from tests.sound_plate import Edit, base, replaced, with_card
 
 

@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.problem import deck_summary, load_deck, parts, problem
+from fecm.problem import parts, problem
+from fecm.problem.loading import load_deck
+from fecm.problem.summary import deck_summary
 from tests import decks
 from tests.calls import call
 from tests.decks import APPENDIX, DATA, LONG, MESH, PROGRAM, ROOT

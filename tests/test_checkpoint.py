@@ -13,10 +13,12 @@ import numpy as np
 import pytest
 
 from fecm.mechanics import kernels
-from fecm.problem import load_deck
-from fecm.results import RowBuffer, hdf5_writer
-from fecm.simulation import Checkpointer, CheckpointError, Simulation, checkpoint_of, spool_of
-from fecm.simulation import run_program as simulate_run
+from fecm.problem.loading import load_deck
+from fecm.results import hdf5_writer
+from fecm.results.sinks import RowBuffer
+from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
+from fecm.simulation.run import run_program as simulate_run
+from fecm.simulation.simulation import Simulation
 from tests.calls import call
 from tests.decks import DATA_CARDS, MESH, small
 from tests.stopped_runs import StoppedError, run, stop_at_once

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.plot import draw
-from fecm.studies import StudyError
+from fecm._errors import StudyError
+from fecm.plot.pictures import draw
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, small
 

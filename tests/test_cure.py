@@ -19,29 +19,20 @@ import pytest
 
 import fecm
 from fecm import Deck, Strengths
-from fecm.deck import (
-    MATERIALS,
-    Cure,
-    Expansion,
-    Preload,
-    grid_lines,
-    parse_layup,
-    read_plies,
-    uniform_section,
-)
-from fecm.mechanics import (
-    CRITERIA,
-    LaminateSection,
-    PlyStresses,
-    Residual,
-    exposure_of,
-    failure_load_factor,
-    residual_stresses,
-)
-from fecm.mechanics.laminate import laminate
-from fecm.problem import load_deck, strengths_of_deck
-from fecm.results import ALL_CRITERIA, EXPOSURES, LargestExposure, largest_exposures
-from fecm.simulation import Simulation, run_program
+from fecm.deck.catalogue import MATERIALS, read_plies
+from fecm.deck.grid import grid_lines, uniform_section
+from fecm.deck.layup import parse_layup
+from fecm.deck.model import Cure, Expansion, Preload
+from fecm.mechanics.failure import CRITERIA, exposure_of, failure_load_factor
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.ply_stresses import PlyStresses, Residual, residual_stresses
+from fecm.problem.loading import load_deck
+from fecm.problem.parts import strengths_of_deck
+from fecm.results.criteria import ALL_CRITERIA
+from fecm.results.exposures import LargestExposure, largest_exposures
+from fecm.results.metrics import EXPOSURES
+from fecm.simulation.run import run_program
+from fecm.simulation.simulation import Simulation
 from fecm.sweeps import in_full
 from fecm.verification import decks
 from tests.builders import Floats, table

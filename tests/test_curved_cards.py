@@ -8,8 +8,11 @@ from dataclasses import replace
 import pytest
 
 import fecm
-from fecm.deck import Finding, model
-from fecm.problem import clamped_frequency, load_deck, needed_bytes
+from fecm.deck import model
+from fecm.deck.findings import Finding
+from fecm.problem.loading import load_deck
+from fecm.problem.memory import needed_bytes
+from fecm.problem.rules.time_step import clamped_frequency
 from fecm.verification import decks
 from tests.curved_panels import mesh, panel, shortly
 

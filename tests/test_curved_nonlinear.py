@@ -11,10 +11,10 @@ from scipy.optimize import brentq
 
 from fecm import Result
 from fecm.deck import model
-from fecm.mechanics import PlateModel
 from fecm.mechanics.laminate import laminate
-from fecm.problem import load_deck
-from fecm.studies import QuickEstimate, quick_estimate
+from fecm.mechanics.plate import PlateModel
+from fecm.problem.loading import load_deck
+from fecm.studies.estimate import QuickEstimate, quick_estimate
 from fecm.verification import decks
 from tests import curved_panels
 from tests.builders import nothing, with_restraints

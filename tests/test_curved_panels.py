@@ -10,10 +10,12 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.deck import ElementGrid, model, uniform_section
-from fecm.mechanics import gages, kernels
-from fecm.problem import load_deck
-from fecm.studies import quick_estimate
+from fecm.deck import model
+from fecm.deck.grid import ElementGrid, uniform_section
+from fecm.mechanics import kernels
+from fecm.mechanics.points import gages
+from fecm.problem.loading import load_deck
+from fecm.studies.estimate import quick_estimate
 from fecm.verification import decks
 from tests import curved_panels
 from tests.builders import DATA, Floats, table

@@ -9,26 +9,19 @@ import numpy as np
 import pytest
 
 from fecm.deck import model
-from fecm.mechanics import (
-    FLAT,
-    CompiledProduct,
-    Curvature,
-    LaminateSection,
-    PlateModel,
-    PlyStresses,
-    buckling_factor,
-    critical_time_step,
-    gages,
-    gauss,
-    kernels,
-    safe_time_step,
-    stiffness_operator,
-    strain_of_deflection,
-    strains_and_resultants,
-    strains_of_deflection,
-    symmetry_reduction,
-    unreduced,
-)
+from fecm.mechanics import kernels
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.kernels.plate import CompiledProduct
+from fecm.mechanics.laminate import LaminateSection
+from fecm.mechanics.membrane import strains_of_deflection
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.ply_stresses import PlyStresses
+from fecm.mechanics.points import gages
+from fecm.mechanics.solutions import buckling_factor
+from fecm.mechanics.stiffness_product import stiffness_operator
+from fecm.mechanics.strains import FLAT, Curvature, strain_of_deflection, strains_and_resultants
+from fecm.mechanics.symmetry import symmetry_reduction, unreduced
+from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from tests.builders import (
     Floats,
     boundary,

@@ -10,9 +10,11 @@ from scipy.linalg import eigh
 
 import fecm
 from fecm import Result
-from fecm.deck import Damping
-from fecm.mechanics import PlateModel, PlateMotion
-from fecm.problem import build_plate, load_deck
+from fecm.deck.model import Damping
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.plate_motion import PlateMotion
+from fecm.problem.loading import load_deck
+from fecm.problem.parts import build_plate
 from tests.builders import Floats, table
 from tests.calls import call
 from tests.decks import DATA_CARDS, MESH, PROGRAM, ROOT, small

@@ -11,13 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import fecm
-from fecm.deck import (
+from fecm.deck.card import format_real, parse_real
+from fecm.deck.findings import DeckError
+from fecm.deck.model import (
     SEGMENTS,
     Boundary,
     Control,
     Coordinates,
     Deck,
-    DeckError,
     Elements,
     Forces,
     Impact,
@@ -28,11 +29,9 @@ from fecm.deck import (
     NumberedSegment,
     Page,
     PrintOption,
-    Reader,
-    Segment,
-    format_real,
-    parse_real,
 )
+from fecm.deck.reader import Reader
+from fecm.deck.segment import Segment
 from tests.decks import APPENDIX, DATA_CARDS, LONG, MESH, small
 
 

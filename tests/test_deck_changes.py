@@ -11,8 +11,11 @@ import pytest
 
 import fecm
 from fecm import Plate
-from fecm.authoring import NAMES, Support, changes
-from fecm.deck import (
+from fecm.authoring import changes
+from fecm.authoring.plate import Support
+from fecm.authoring.values import NAMES
+from fecm.deck.layup import parse_layup, parse_plies
+from fecm.deck.model import (
     Allowables,
     Boundary,
     Delamination,
@@ -20,8 +23,6 @@ from fecm.deck import (
     Indentation,
     Macro,
     Projectile,
-    parse_layup,
-    parse_plies,
 )
 from fecm.problem.generate import generate
 from tests.decks import LONG, ROOT

@@ -11,22 +11,14 @@ import pytest
 
 from fecm import _machine
 from fecm._machine import NotEnoughMemoryError
-from fecm.deck import (
-    MOST,
-    MOST_PROBLEMS,
-    Card,
-    CardPlace,
-    Finding,
-    Findings,
-    LayupError,
-    estimate_work,
-    load_text,
-    parse_integer,
-    parse_layup,
-    reader,
-    segment,
-)
-from fecm.problem import generate, load_deck
+from fecm.deck import reader, segment
+from fecm.deck.card import Card, parse_integer
+from fecm.deck.findings import MOST, CardPlace, Finding, Findings
+from fecm.deck.layup import LayupError, parse_layup
+from fecm.deck.macros import estimate_work
+from fecm.deck.reader import MOST_PROBLEMS, load_text
+from fecm.problem import generate
+from fecm.problem.loading import load_deck
 from fecm.problem.rules import gages as gage_rules
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, MESH, OWN_FINDINGS, PROGRAM, small

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fecm import load
-from fecm.listing import fortran_number, read_tapes, write_tapes
+from fecm.listing.tapes import fortran_number, read_tapes, write_tapes
 from tests.calls import assert_unusable, diff, line_about
 from tests.decks import DATA
 

@@ -7,8 +7,8 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.mechanics import element_blocks
-from fecm.problem import load_deck
+from fecm.mechanics.mesh import element_blocks
+from fecm.problem.loading import load_deck
 from tests.builders import (
     Floats,
     Ints,

@@ -9,7 +9,10 @@ import pytest
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
-from fecm.mechanics import PlateModel, element_blocks, element_matrices, gauss, interpolation
+from fecm.mechanics import element_matrices, interpolation
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.mesh import element_blocks
+from fecm.mechanics.plate import PlateModel
 from tests.builders import (
     GENERAL_LAYERS,
     GENERAL_PLY,

@@ -9,16 +9,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm.mechanics import (
-    PlateModel,
-    Quadrature,
-    StrainField,
-    element_blocks,
-    gauss,
-    interpolation,
-    nodal,
-    stiffness_operator,
-)
+from fecm.mechanics import interpolation
+from fecm.mechanics.elements import Quadrature, gauss, nodal
+from fecm.mechanics.mesh import element_blocks
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.stiffness_product import stiffness_operator
+from fecm.mechanics.strains import StrainField
 from tests.builders import (
     SKEWED,
     SQUARE,

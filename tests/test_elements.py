@@ -8,20 +8,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fecm.mechanics import (
-    CUBIC,
-    QUADRILATERAL,
-    SHAPES,
-    TRIANGLE,
-    ElementBlock,
-    ElementShape,
-    Quadrature,
-    element_blocks,
-    interpolation,
-    longest_sides,
-    nodal,
-    shape_of,
-)
+from fecm.mechanics import interpolation
+from fecm.mechanics.elements import CUBIC, QUADRILATERAL, TRIANGLE, ElementShape, Quadrature, nodal
+from fecm.mechanics.mesh import SHAPES, ElementBlock, element_blocks, longest_sides, shape_of
 from tests.builders import Bools, Floats
 
 BY_NAME = pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.name)

@@ -15,7 +15,7 @@ import pytest
 
 import fecm
 from fecm import DeckError, DivergenceError
-from fecm.deck import CardPlace, Finding
+from fecm.deck.findings import CardPlace, Finding
 from tests.decks import small
 
 FINDING = Finding(

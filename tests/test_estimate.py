@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck import Impact
-from fecm.problem import load_deck
-from fecm.studies import quick_estimate
+from fecm.deck.model import Impact
+from fecm.problem.loading import load_deck
+from fecm.studies.estimate import quick_estimate
 from tests.calls import call
 from tests.decks import MESH, PROGRAM, small
 

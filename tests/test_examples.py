@@ -10,7 +10,7 @@ import pytest
 
 import fecm
 from fecm import examples
-from fecm.problem import load_deck
+from fecm.problem.loading import load_deck
 from tests.calls import assert_unusable, call
 
 DECKS = [name for name in examples.names() if name.endswith(".inp")]

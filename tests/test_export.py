@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm import Result
-from fecm.results import ExportError, dataset_csv_lines, write_vtkhdf
+from fecm.results.export import dataset_csv_lines, write_vtkhdf
+from fecm.results.groups import ExportError
 from tests.builders import SQUARE, one_element
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ROOT, small

@@ -16,12 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import trapezoid
 
 import fecm
-from fecm.authoring import CasesError
+from fecm.authoring.case import CasesError
 from fecm.cli.interrupts import signals
-from fecm.mechanics import LIBRARY, OwnProjectile, puck
-from fecm.problem import build_law, build_projectile
-from fecm.results import ALL_CRITERIA
-from fecm.simulation import Solver
+from fecm.mechanics.failure import puck
+from fecm.mechanics.kernels import LIBRARY
+from fecm.mechanics.projectile import OwnProjectile
+from fecm.problem.parts import build_law, build_projectile
+from fecm.results.criteria import ALL_CRITERIA
+from fecm.simulation.job import Solver
 from tests.calls import assert_unusable, call
 from tests.decks import LONG, PROGRAM, small
 from tests.test_first_failure import failing

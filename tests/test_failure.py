@@ -12,24 +12,23 @@ from hypothesis import strategies as st
 
 import fecm
 from fecm import Ply, Strengths
-from fecm.mechanics import (
+from fecm.mechanics.failure import (
     CRITERIA,
     MODES,
     Candidates,
     Codes,
     exposure_of,
-    in_plane_stresses,
     interlaminar,
     is_evaluated,
-    is_fabric,
     largest_modes,
     max_stress,
     puck,
     puck_limits,
     tsai_wu,
 )
-from fecm.mechanics.laminate import laminate
-from fecm.problem import ply_strengths
+from fecm.mechanics.laminate import is_fabric, laminate
+from fecm.mechanics.ply_stresses import in_plane_stresses
+from fecm.problem.parts import ply_strengths
 from tests.builders import Floats, table
 
 # T300/5208 (Tsai and Hahn), MPa.

@@ -13,24 +13,21 @@ import pytest
 import fecm
 from fecm import Ply, Strengths
 from fecm._typing import Floats
-from fecm.mechanics import (
-    CRITERIA,
-    CompiledMonitor,
-    Evaluations,
-    FailureEnvelope,
-    FailureMonitor,
-    MeshArrays,
-    OwnCriterion,
-    PlyPoints,
-    PlyStresses,
-    gauss,
-    kernels,
-)
+from fecm.mechanics import kernels
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.exposures import Evaluations, FailureEnvelope, PlyPoints
+from fecm.mechanics.failure import CRITERIA, OwnCriterion
+from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.mechanics.kernels import failure as compiled_failure
+from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.laminate import laminate
-from fecm.problem import build_model, load_deck
-from fecm.results import MemorySink
-from fecm.simulation import Simulation, run_program
+from fecm.mechanics.mesh import MeshArrays
+from fecm.mechanics.ply_stresses import PlyStresses
+from fecm.problem.build import build_model
+from fecm.problem.loading import load_deck
+from fecm.results.sinks import MemorySink
+from fecm.simulation.run import run_program
+from fecm.simulation.simulation import Simulation
 from tests.builders import distorted_square, nothing, square, with_restraints
 from tests.test_failure_runs import failing
 

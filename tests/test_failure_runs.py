@@ -12,22 +12,24 @@ import pytest
 import fecm
 from fecm import Ply, Strengths
 from fecm._text import jsonable
-from fecm.deck import Allowables
-from fecm.mechanics import (
-    CRITERIA,
-    FailureMonitor,
-    PlateModel,
-    PlyStresses,
-    element_blocks,
-    exposure_of,
-    gauss,
-    interpolate,
-)
+from fecm.deck.model import Allowables
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.failure import CRITERIA, exposure_of
+from fecm.mechanics.failure_monitor import FailureMonitor
+from fecm.mechanics.interpolation import interpolate
 from fecm.mechanics.laminate import laminate
-from fecm.problem import load_deck, strengths_of_deck
-from fecm.results import ALL_CRITERIA, MemorySink, about_run, largest_exposures, run_summary
-from fecm.simulation import Solver, simulate
-from fecm.sweeps import without_output
+from fecm.mechanics.mesh import element_blocks
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.ply_stresses import PlyStresses
+from fecm.problem.loading import load_deck
+from fecm.problem.parts import strengths_of_deck
+from fecm.results.criteria import ALL_CRITERIA
+from fecm.results.exposures import largest_exposures
+from fecm.results.sinks import MemorySink
+from fecm.results.summary import about_run, run_summary
+from fecm.simulation.job import Solver
+from fecm.simulation.run import simulate
+from fecm.sweeps.in_full import without_output
 from tests.builders import nothing, rules, square, table, with_restraints
 from tests.calls import call
 from tests.decks import PROGRAM, small

@@ -13,10 +13,12 @@ import pytest
 
 import fecm
 from fecm import Deck
-from fecm.authoring import CasesError
-from fecm.deck import Allowables, Cure, Delamination, Expansion, Impact
-from fecm.results import EXPOSURES, largest_exposures
-from fecm.simulation import Simulation, run_program
+from fecm.authoring.case import CasesError
+from fecm.deck.model import Allowables, Cure, Delamination, Expansion, Impact
+from fecm.results.exposures import largest_exposures
+from fecm.results.metrics import EXPOSURES
+from fecm.simulation.run import run_program
+from fecm.simulation.simulation import Simulation
 from fecm.sweeps import in_full
 from tests.calls import call
 from tests.test_find import deck as tough

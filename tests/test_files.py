@@ -16,7 +16,7 @@ import pytest
 import fecm
 from fecm import _files
 from fecm._files import OutputError, beside, check_outputs, partial_of
-from fecm.simulation import checkpoint_of
+from fecm.simulation.checkpoint import checkpoint_of
 from tests.calls import assert_unusable, call
 from tests.decks import small
 from tests.without_posix import of_closed_files

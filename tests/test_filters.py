@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fecm.studies import Filter, FilterKind, filter_of
+from fecm.studies.rod_test.filters import Filter, FilterKind, filter_of
 
 RISE = 10e-6
 OF_RISE_TIMES = (FilterKind.FIRST_ORDER, FilterKind.MOVING_AVERAGE)

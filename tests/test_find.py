@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results import FOUND
-from fecm.sweeps import lowest_velocities
+from fecm.results.metrics import FOUND
+from fecm.sweeps.search import lowest_velocities
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small
 

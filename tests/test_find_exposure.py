@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.authoring import CasesError
-from fecm.deck import quantity
-from fecm.results import EXPOSURES, band_of_largest, largest_exposures
-from fecm.sweeps import LEVEL_EXCESS, velocity_at_level
+from fecm.authoring.case import CasesError
+from fecm.deck.units import quantity
+from fecm.results.exposures import band_of_largest, largest_exposures
+from fecm.results.metrics import EXPOSURES
+from fecm.sweeps.search import LEVEL_EXCESS, velocity_at_level
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, small
 from tests.test_first_failure import failing, run

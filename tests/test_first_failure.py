@@ -11,9 +11,12 @@ import pytest
 import fecm
 from fecm import Result
 from fecm._typing import Bools
-from fecm.mechanics import CRITERIA, FailureEnvelope, Largest, Maxima, PlyStresses, exposure_of
-from fecm.problem import load_deck, strengths_of_deck
-from fecm.results import evaluations_in_contact, first_failures
+from fecm.mechanics.exposures import FailureEnvelope, Largest, Maxima
+from fecm.mechanics.failure import CRITERIA, exposure_of
+from fecm.mechanics.ply_stresses import PlyStresses
+from fecm.problem.loading import load_deck
+from fecm.problem.parts import strengths_of_deck
+from fecm.results.exposures import evaluations_in_contact, first_failures
 from tests.calls import call
 from tests.decks import DATA_CARDS, DISC, PROGRAM, small
 from tests.test_machines import validate

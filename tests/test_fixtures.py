@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck import Impact, Patch
-from fecm.mechanics import static_stiffness, static_support
-from fecm.problem import build_projectile, load_deck
+from fecm.deck.model import Impact, Patch
+from fecm.mechanics.solutions import static_stiffness, static_support
+from fecm.problem.loading import load_deck
+from fecm.problem.parts import build_projectile
 from tests.calls import assert_unusable, call, new, new_deck
 
 WINDOW = "150x100 plate, w=0 along the window"

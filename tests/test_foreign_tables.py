@@ -11,12 +11,15 @@ import pytest
 
 import fecm
 from fecm import FecmWarning
+from fecm._errors import StudyError
 from fecm._measured_tables import read_table
-from fecm.authoring import CasesError
-from fecm.location import strain_table
-from fecm.results import measurement_of
-from fecm.studies import StudyError, pulse_of, read_test, recorded
-from fecm.sweeps import read_cases
+from fecm.authoring.case import CasesError
+from fecm.location.table import strain_table
+from fecm.results.comparison import measurement_of
+from fecm.studies.indentation_test.turns import read_test
+from fecm.studies.rod_test.filters import recorded
+from fecm.studies.rod_test.pulse_test import pulse_of
+from fecm.sweeps.case_tables import read_cases
 from tests.calls import assert_unusable, call
 from tests.decks import ROOT
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fecm import Ply
-from fecm.deck import (
+from fecm.deck.model import (
     Allowables,
     Boundary,
     Control,
@@ -39,12 +39,12 @@ from fecm.deck import (
     Page,
     Preload,
     PrintOption,
-    Reader,
     Units,
     Zone,
     Zones,
 )
-from fecm.problem import load_deck
+from fecm.deck.reader import Reader
+from fecm.problem.loading import load_deck
 from tests.decks import small
 from tests.fuzz_decks import examine, mutate
 

@@ -14,8 +14,8 @@ import h5py
 import pytest
 
 import fecm
+from fecm._errors import ResultFileError
 from fecm.cli.isolation import limits_for
-from fecm.results import ResultFileError
 from tests.calls import assert_unusable, call
 from tests.decks import PROGRAM as PROGRAM_CARDS
 from tests.decks import small

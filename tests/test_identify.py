@@ -12,11 +12,12 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.authoring import CasesError
-from fecm.deck import Indentation
-from fecm.identification import IdentifyError
-from fecm.plot import force_fit_picture
-from fecm.studies import StudyError, filter_of
+from fecm._errors import StudyError
+from fecm.authoring.case import CasesError
+from fecm.deck.model import Indentation
+from fecm.identification.alignment import IdentifyError
+from fecm.plot.histories import force_fit_picture
+from fecm.studies.rod_test.filters import filter_of
 from tests.calls import Done, assert_unusable, call
 from tests.decks import PROGRAM, small
 

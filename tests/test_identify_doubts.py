@@ -14,9 +14,11 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.identification import IdentifyError, level, noise, onset, sign_runs
-from fecm.report import page_of
-from fecm.studies import StudyError, filter_of
+from fecm._errors import StudyError
+from fecm.identification.alignment import IdentifyError, level, noise, onset
+from fecm.identification.misfit import sign_runs
+from fecm.report.report import page_of
+from fecm.studies.rod_test.filters import filter_of
 from tests.calls import call
 
 Floats = NDArray[np.float64]

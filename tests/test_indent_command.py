@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fecm.studies import fit_contact_law, read_test
+from fecm.studies.indentation_test.constants import fit_contact_law
+from fecm.studies.indentation_test.turns import read_test
 from tests.calls import assert_unusable, call
 from tests.decks import LONG
 from tests.indentation_tests import ALPHA_P, S_P, K, Q, make_test, noisy, written
@@ -143,7 +144,7 @@ def test_a_deck_is_not_replaced_by_its_own_curve(tmp_path: Path) -> None:
 
 def test_the_picture_of_a_fit_holds_every_point_and_the_line() -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot import indentation_fit_picture as draw
+    from fecm.plot.studies import indentation_fit_picture as draw
 
     a, f = make_test()
     found = fit_contact_law(a, noisy(f, 0))

@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fecm.studies import ContactLawFit, FittedValue, divide, fit_contact_law, fit_notes
+from fecm.studies.indentation_test.constants import ContactLawFit, fit_contact_law, fit_notes
+from fecm.studies.indentation_test.curves import FittedValue
+from fecm.studies.indentation_test.turns import divide
 from tests.indentation_tests import (
     ALPHA_P,
     PEAKS,

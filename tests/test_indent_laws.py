@@ -12,9 +12,11 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.deck import CONTACTS, Indentation, format_deck
-from fecm.mechanics import YangSunPermanent, hertz_coefficient
-from fecm.problem import load_deck
+from fecm.deck.catalogue import CONTACTS
+from fecm.deck.format import format_deck
+from fecm.deck.model import Indentation
+from fecm.mechanics.contact_law import YangSunPermanent, hertz_coefficient
+from fecm.problem.loading import load_deck
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, small
 from tests.indentation_tests import K

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fecm import ContactPoint, Law
-from fecm.listing import ListingLaw
-from fecm.mechanics import (
+from fecm.listing.law import ListingLaw
+from fecm.mechanics.contact_law import (
     RELOADING,
     UNLOADING,
     VIRGIN,

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from fecm import Ply
-from fecm.deck import poissons_ratio_across, read_plies
-from fecm.mechanics import (
+from fecm.deck.catalogue import poissons_ratio_across, read_plies
+from fecm.mechanics.contact_law import hertz_coefficient
+from fecm.mechanics.half_space import (
     PlyError,
     effective_stiffness,
-    hertz_coefficient,
     indentation_modulus,
     ply_stiffness,
 )

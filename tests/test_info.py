@@ -16,7 +16,10 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results import DATASETS, GROUPS, ResultFileError, read
+from fecm._errors import ResultFileError
+from fecm.results.groups import GROUPS
+from fecm.results.hdf5_reader import read
+from fecm.results.schema import DATASETS
 from tests.calls import assert_unusable, call
 from tests.decks import APPENDIX, DATA_CARDS, PROGRAM, small
 

@@ -9,9 +9,15 @@ import pytest
 
 import fecm
 from fecm import Ply
-from fecm.deck import MASS, MATERIALS, NAMES, Allowables, Damping, Finding, convert
-from fecm.mechanics import MeshArrays
-from fecm.problem import clamped_frequency, likely_unit, load_deck, unsupported
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.findings import Finding
+from fecm.deck.model import Allowables, Damping
+from fecm.deck.units import MASS, NAMES, convert
+from fecm.mechanics.mesh import MeshArrays
+from fecm.problem.loading import load_deck
+from fecm.problem.outline import unsupported
+from fecm.problem.rules.time_step import clamped_frequency
+from fecm.problem.rules.units import likely_unit
 from tests.decks import DATA, ROOT
 from tests.sound_plate import STRENGTHS, Edit, base, found, replaced, strengths, with_card, with_ply
 

@@ -20,10 +20,14 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.listing import active_slips
-from fecm.problem import RunOptions, load_deck
-from fecm.results import MemorySink
-from fecm.simulation import Checkpointer, Interpreter, Simulation, checkpoint_of, simulate
+from fecm.listing.slips import active_slips
+from fecm.problem.build import RunOptions
+from fecm.problem.loading import load_deck
+from fecm.results.sinks import MemorySink
+from fecm.simulation.checkpoint import Checkpointer, checkpoint_of
+from fecm.simulation.interpreter import Interpreter
+from fecm.simulation.run import simulate
+from fecm.simulation.simulation import Simulation
 from tests.calls import Done, call, program
 from tests.decks import DATA_CARDS, LONG, LONGER, PROGRAM, small
 from tests.kill_runs import FECM, SWEEP, SWEPT, sweep_trial, trial, verdict

@@ -24,7 +24,7 @@ from fecm.errors import (
     StoppedError,
     StudyError,
 )
-from fecm.simulation import Solver
+from fecm.simulation.job import Solver
 from fecm.sweeps.exclusions import exclusions_table
 from tests.calls import call
 from tests.decks import small

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck import unit_names
-from fecm.problem import restraint_codes
+from fecm.deck.units import unit_names
+from fecm.problem.generate import restraint_codes
 from tests.builders import square
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, MESH, small

@@ -16,28 +16,21 @@ from matplotlib.text import Text
 
 import fecm
 from fecm import Deck, SweepResult
-from fecm.plot import draw
-from fecm.problem import load_deck
-from fecm.results import (
-    LIMITS,
+from fecm.plot.pictures import draw
+from fecm.problem.loading import load_deck
+from fecm.results.end import (
     Deflection,
     End,
-    Extent,
-    IndentationMetrics,
-    InPlane,
     LastContact,
-    Projectiles,
     RigidMotion,
-    counted,
     decided,
     ends,
-    impact_metrics,
-    in_plane_of,
-    run_summary,
     settled_deflection,
-    softness,
 )
-from fecm.sweeps import exceedance_bounds, wilson
+from fecm.results.metrics import IndentationMetrics, Projectiles, impact_metrics
+from fecm.results.summary import run_summary
+from fecm.results.validity import LIMITS, Extent, InPlane, counted, in_plane_of, softness
+from fecm.sweeps.statistics import exceedance_bounds, wilson
 from tests.builders import table
 from tests.calls import call
 from tests.decks import small

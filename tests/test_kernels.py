@@ -17,39 +17,27 @@ import pytest
 
 import fecm
 from fecm import Result, Rod
-from fecm.mechanics import (
-    COLUMNS,
-    LANES,
-    NDOF,
-    RELOADING,
-    TYING,
-    UNLOADING,
-    VIRGIN,
-    CompiledProduct,
-    CompiledStrains,
-    ElementKind,
-    Given,
-    LaminateSection,
-    LawKind,
-    PlateModel,
-    ProjectileModes,
-    Quadrature,
-    ResultRow,
-    RodState,
-    StrainField,
-    StrainsStruct,
-    WilsonStep,
-    failure,
-    gauss,
-    impact,
-    kernels,
-    nodal,
-    stiffness_operator,
-    strains,
-    symmetry_reduction,
-)
+from fecm.mechanics import failure, impact, kernels, strains
+from fecm.mechanics.contact_law import RELOADING, UNLOADING, VIRGIN
+from fecm.mechanics.elements import Quadrature, gauss, nodal
+from fecm.mechanics.impact_steps import COLUMNS, LawKind
+from fecm.mechanics.impact_sweep import Given, ResultRow
+from fecm.mechanics.interpolation import NDOF
+from fecm.mechanics.kernels.element_groups import ElementKind
 from fecm.mechanics.kernels.failure import COMPILED
-from fecm.problem import Problem, RunOptions, build_model, load_deck
+from fecm.mechanics.kernels.layout import LANES
+from fecm.mechanics.kernels.plate import CompiledProduct
+from fecm.mechanics.kernels.strains import TYING, CompiledStrains, StrainsStruct
+from fecm.mechanics.laminate import LaminateSection
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.projectile import RodState, WilsonStep
+from fecm.mechanics.rod_modes import ProjectileModes
+from fecm.mechanics.stiffness_product import stiffness_operator
+from fecm.mechanics.strains import StrainField
+from fecm.mechanics.symmetry import symmetry_reduction
+from fecm.problem.build import RunOptions, build_model
+from fecm.problem.loading import load_deck
+from fecm.problem.problem import Problem
 from tests.builders import (
     boundary,
     distorted_square,

@@ -7,16 +7,16 @@ import pytest
 
 import fecm
 from fecm import Deck, Ply
-from fecm.deck import Control, Integration, Layer, Material
-from fecm.listing import PlateVariant
-from fecm.mechanics import (
+from fecm.deck.model import Control, Integration, Layer, Material
+from fecm.listing.variant import PlateVariant
+from fecm.mechanics.laminate import (
     LaminateSection,
+    laminate,
     reduced_stiffness,
     transformed_shear,
     transformed_stiffness,
 )
-from fecm.mechanics.laminate import laminate
-from fecm.problem import laminates_of_deck
+from fecm.problem.parts import laminates_of_deck
 from tests.builders import (
     GENERAL_PLY,
     REPORT_ANGLES,

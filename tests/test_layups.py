@@ -11,8 +11,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import fecm
-from fecm.authoring import CasesError, apply_case
-from fecm.deck import LayupError, Material, parse_layup, parse_plies
+from fecm.authoring.case import CasesError
+from fecm.authoring.values import apply_case
+from fecm.deck.layup import LayupError, parse_layup, parse_plies
+from fecm.deck.model import Material
 from tests.calls import call
 from tests.decks import APPENDIX
 

@@ -9,8 +9,9 @@ import pytest
 
 import fecm
 from fecm import DeckError, Result
-from fecm.listing import NAMES, Mode, variant_of
-from fecm.problem import load_deck
+from fecm.listing.slips import NAMES, Mode
+from fecm.listing.variant import variant_of
+from fecm.problem.loading import load_deck
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ready, small
 

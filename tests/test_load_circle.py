@@ -9,16 +9,15 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.mechanics import CircleStresses, element_blocks, inner_corners
-from fecm.problem import load_deck
-from fecm.results import (
+from fecm.mechanics.exposures import CircleStresses
+from fecm.mechanics.mesh import element_blocks, inner_corners
+from fecm.problem.loading import load_deck
+from fecm.results.exposure_bands import LoadMesh, is_bounded, mesh_band
+from fecm.results.exposures import (
     FailureVerdict,
     LargestExposure,
-    LoadMesh,
     failure_verdict,
-    is_bounded,
     largest_exposures,
-    mesh_band,
 )
 from tests.builders import report_plate, square, table
 

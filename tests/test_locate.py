@@ -13,11 +13,14 @@ import pytest
 
 import fecm
 from fecm.deck import model
-from fecm.location import Sampling, moving_plate, responses, rows_of, shared_symmetry
-from fecm.mechanics import PlateMotion, gages, patch_weights
-from fecm.problem import build_plate, sole_problem
+from fecm.location.model import Sampling, moving_plate, responses, rows_of
+from fecm.location.prepare import shared_symmetry
+from fecm.mechanics.plate_motion import PlateMotion
+from fecm.mechanics.points import gages, patch_weights
 from fecm.problem.generate import generate
-from fecm.sweeps import plate_response
+from fecm.problem.loading import sole_problem
+from fecm.problem.parts import build_plate
+from fecm.sweeps.responses import plate_response
 from tests.panels import (
     OFF_AXIS,
     PUBLIC,

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fecm.location import Errors, LocationFit, PlaceTrial, judged_force
+from fecm.location.fit import Errors, LocationFit, PlaceTrial, judged_force
 from tests.panels import Floats
 
 NOISE = 2e-6

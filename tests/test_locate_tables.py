@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck import unit_names
-from fecm.location import strain_table
-from fecm.results import NotStoredError, ResultFileError
-from fecm.studies import StudyError
+from fecm._errors import ResultFileError, StudyError
+from fecm.deck.units import unit_names
+from fecm.location.table import strain_table
+from fecm.results.groups import NotStoredError
 from tests.calls import Done, call
 from tests.panels import OFF_AXIS, STRUCK, TIME, Floats, panel, scatter, struck, with_gages
 

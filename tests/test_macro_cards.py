@@ -8,14 +8,14 @@ import pytest
 
 import fecm
 from fecm import Ply
-from fecm.deck import (
-    WORDS,
+from fecm.deck.findings import DeckError, Finding
+from fecm.deck.format import format_deck
+from fecm.deck.macros import WORDS, estimate_work
+from fecm.deck.model import (
     Allowables,
     Cure,
     Curvature,
-    DeckError,
     Expansion,
-    Finding,
     Impact,
     Indentation,
     LaminateNumber,
@@ -30,17 +30,14 @@ from fecm.deck import (
     Patch,
     Preload,
     Projectile,
-    Reader,
-    Segment,
     Shear,
     Zone,
     Zones,
-    estimate_work,
-    format_deck,
-    read_deck,
 )
-from fecm.listing import MODES
-from fecm.problem import load_deck
+from fecm.deck.reader import Reader, read_deck
+from fecm.deck.segment import Segment
+from fecm.listing.slips import MODES
+from fecm.problem.loading import load_deck
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ROOT, small
 

@@ -10,9 +10,11 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.deck import LoadTable, load_factor
-from fecm.mechanics import modes
-from fecm.problem import build_plate, load_deck
+from fecm.deck.macros import load_factor
+from fecm.deck.model import LoadTable
+from fecm.mechanics.solutions import modes
+from fecm.problem.loading import load_deck
+from fecm.problem.parts import build_plate
 from tests.calls import call
 from tests.decks import DATA, DATA_CARDS, MESH, PROGRAM, ROOT, small
 

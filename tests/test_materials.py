@@ -10,17 +10,10 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck import (
-    MATERIALS,
-    NAMES,
-    Allowables,
-    Deck,
-    Delamination,
-    Indentation,
-    UnitsError,
-    system_named,
-)
-from fecm.problem import load_deck
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.model import Allowables, Deck, Delamination, Indentation
+from fecm.deck.units import NAMES, UnitsError, system_named
+from fecm.problem.loading import load_deck
 from tests.calls import Done, assert_unusable, call
 
 PLATE = (

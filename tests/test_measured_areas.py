@@ -9,8 +9,8 @@ from math import pi, sqrt
 import pytest
 
 import fecm
-from fecm.mechanics import threshold_force
-from fecm.problem import load_deck
+from fecm.mechanics.laminate import threshold_force
+from fecm.problem.loading import load_deck
 from tests.decks import ROOT
 
 PAGE = (ROOT / "docs" / "measured.md").read_text(encoding="utf-8")

@@ -10,8 +10,8 @@ import pytest
 import fecm._machine
 from fecm._machine import NotEnoughMemoryError
 from fecm._measured_tables import COPIES, FIELD_BYTES, LINE_BYTES, read_table
-from fecm.authoring import CasesError
-from fecm.sweeps import read_cases
+from fecm.authoring.case import CasesError
+from fecm.sweeps.case_tables import read_cases
 
 NAMES = ("velocity", "k", "alpha_p", "s_p", "q")
 

@@ -20,9 +20,12 @@ import fecm._machine
 import fecm.deck.reader
 import fecm.problem.memory
 from fecm._machine import NotEnoughMemoryError, available_memory, format_bytes
-from fecm.mechanics import critical_time_step
-from fecm.problem import build_plate, load_deck, needed_bytes
-from fecm.sweeps import ADVANCED_BYTES, HISTORY_BYTES, MOST_TOGETHER
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.loading import load_deck
+from fecm.problem.memory import needed_bytes
+from fecm.problem.parts import build_plate
+from fecm.sweeps.checks import ADVANCED_BYTES, HISTORY_BYTES
+from fecm.sweeps.task import MOST_TOGETHER
 from tests.calls import assert_unusable, call
 from tests.decks import small
 from tests.test_nonlinear_decks import text

@@ -5,20 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm.deck import (
+from fecm.deck.findings import Findings
+from fecm.deck.model import (
     Boundary,
     Control,
     Coordinates,
     Deck,
     ElementNodes,
     Elements,
-    Findings,
     Forces,
     NodeCodes,
     NodeValues,
-    Segment,
 )
-from fecm.mechanics import MeshArrays
+from fecm.deck.segment import Segment
+from fecm.mechanics.mesh import MeshArrays
 from fecm.problem.generate import generate
 
 

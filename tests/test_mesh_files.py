@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.problem import PlateMesh, read_mesh
+from fecm.problem.plate_mesh import PlateMesh, read_mesh
 
 MESHES = Path(__file__).parent / "data" / "meshes"
 NUMBERED = {"left": "4", "right": "2"}  # groups of Nastran are the numbers of properties

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.plot import PlotError, draw
-from fecm.results import METRICS, RATIO, SUMMARY, THRESHOLD, VERDICTS, run_summary
+from fecm.plot.kinds import PlotError
+from fecm.plot.pictures import draw
+from fecm.results.metrics import METRICS, RATIO, SUMMARY, THRESHOLD, VERDICTS
+from fecm.results.summary import run_summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, small
 

@@ -9,8 +9,9 @@ import pytest
 
 import fecm
 from fecm import DivergenceError, Result
-from fecm.mechanics import critical_time_step
-from fecm.problem import build_plate, load_deck
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.loading import load_deck
+from fecm.problem.parts import build_plate
 from tests.decks import DATA
 
 BASE = (DATA / "plate-100x100x2.inp").read_text()

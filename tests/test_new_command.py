@@ -9,9 +9,11 @@ import pytest
 
 import fecm
 from fecm.cli.new import new_command as command
-from fecm.deck import MATERIALS, Delamination, Impact, Material, Nonlinear, Shear
-from fecm.mechanics import Tangent, in_plane_pins, static_stiffness
-from fecm.problem import deck_summary, load_deck
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.model import Delamination, Impact, Material, Nonlinear, Shear
+from fecm.mechanics.solutions import Tangent, in_plane_pins, static_stiffness
+from fecm.problem.loading import load_deck
+from fecm.problem.summary import deck_summary
 from tests import closed_forms
 from tests.builders import DATA
 from tests.calls import assert_unusable, call, new, new_deck

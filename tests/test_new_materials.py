@@ -11,8 +11,9 @@ import pytest
 
 import fecm
 from fecm import Ply
-from fecm.deck import (
-    MATERIALS,
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.layup import parse_plies
+from fecm.deck.model import (
     Allowables,
     Cure,
     Deck,
@@ -21,14 +22,14 @@ from fecm.deck import (
     Indentation,
     Material,
     Preload,
-    Segment,
     Zones,
-    parse_plies,
 )
-from fecm.mechanics import CRITERIA
-from fecm.problem import load_deck
+from fecm.deck.segment import Segment
+from fecm.mechanics.failure import CRITERIA
+from fecm.problem.loading import load_deck
 from fecm.problem.plate_mesh import plate_mesh
-from fecm.results import is_isotropic, largest_exposures
+from fecm.results.criteria import is_isotropic
+from fecm.results.exposures import largest_exposures
 from tests.calls import Done, call
 
 PLATE = ("--size", "40x30", "--mesh", "4x3", "--support", "simple", "--patch", "none")

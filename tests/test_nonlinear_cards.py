@@ -12,13 +12,15 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.authoring import apply_case
-from fecm.deck import Boundary, Curvature, Delamination, Finding, Nonlinear, Preload, Shear
-from fecm.mechanics import critical_time_step
-from fecm.problem import build_plate, load_deck, sole_problem
+from fecm._errors import StudyError
+from fecm.authoring.values import apply_case
+from fecm.deck.findings import Finding
+from fecm.deck.model import Boundary, Curvature, Delamination, Nonlinear, Preload, Shear
+from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.generate import generate
-from fecm.studies import StudyError
-from fecm.sweeps import shares_plate
+from fecm.problem.loading import load_deck, sole_problem
+from fecm.problem.parts import build_plate
+from fecm.sweeps.backends import shares_plate
 from tests.builders import DATA
 from tests.calls import assert_unusable, call
 from tests.decks import ROOT

@@ -25,7 +25,7 @@ from scipy.special import ellipk
 
 import fecm
 from fecm import Result
-from fecm.authoring import InPlane
+from fecm.authoring.mesh import InPlane
 from fecm.verification.decks import run_of_deck
 from tests.builders import Floats, table
 from tests.nonlinear_impacts import (

@@ -15,23 +15,19 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.mechanics import (
-    FLAT,
-    UNLOADED,
-    CompiledProduct,
-    Curvature,
-    ElementProduct,
-    LaminateSection,
-    NonlinearProduct,
-    PlateModel,
-    SymmetryReduction,
-    internal_force_operator,
-    kernels,
-    stiffness_operator,
-    symmetry_reduction,
-    unreduced,
-)
+from fecm.mechanics import kernels
 from fecm.mechanics.kernels import membrane
+from fecm.mechanics.kernels.plate import CompiledProduct
+from fecm.mechanics.laminate import LaminateSection
+from fecm.mechanics.plate import UNLOADED, PlateModel
+from fecm.mechanics.stiffness_product import (
+    ElementProduct,
+    NonlinearProduct,
+    internal_force_operator,
+    stiffness_operator,
+)
+from fecm.mechanics.strains import FLAT, Curvature
+from fecm.mechanics.symmetry import SymmetryReduction, symmetry_reduction, unreduced
 from tests.builders import (
     Floats,
     Ints,

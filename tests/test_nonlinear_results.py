@@ -13,22 +13,26 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.deck import ElementGrid, model, uniform_section
-from fecm.mechanics import (
-    IntegrationRules,
-    PlateModel,
-    PlyStresses,
-    Stretching,
-    gages,
-    gauss,
-    kernels,
-    quadratic_strains_at,
-    strains_and_resultants,
-)
-from fecm.plot import draw
-from fecm.problem import load_deck
-from fecm.results import End, Extent, Judge, MemorySink, run_summary
-from fecm.simulation import Simulation, judge, simulate
+from fecm.deck import model
+from fecm.deck.grid import ElementGrid, uniform_section
+from fecm.mechanics import kernels
+from fecm.mechanics.element_matrices import IntegrationRules
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.membrane import quadratic_strains_at
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.ply_stresses import PlyStresses
+from fecm.mechanics.points import gages
+from fecm.mechanics.strains import strains_and_resultants
+from fecm.mechanics.stretching import Stretching
+from fecm.plot.pictures import draw
+from fecm.problem.loading import load_deck
+from fecm.results.end import End
+from fecm.results.sinks import MemorySink
+from fecm.results.summary import run_summary
+from fecm.results.validity import Extent, Judge
+from fecm.simulation import judge
+from fecm.simulation.run import simulate
+from fecm.simulation.simulation import Simulation
 from fecm.verification import decks
 from tests.builders import (
     GENERAL_ANGLES,

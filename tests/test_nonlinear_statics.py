@@ -22,16 +22,10 @@ import numpy as np
 import pytest
 
 from fecm import Ply
-from fecm.mechanics import (
-    FLAT,
-    Curvature,
-    LaminateSection,
-    MembraneForces,
-    PlateModel,
-    quadratic_strains,
-    tangent,
-)
-from fecm.mechanics.laminate import laminate
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.membrane import MembraneForces, quadratic_strains, tangent
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.strains import FLAT, Curvature
 from tests.builders import (
     PARALLELOGRAM,
     SKEWED,

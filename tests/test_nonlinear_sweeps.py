@@ -14,14 +14,18 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.authoring import Case
-from fecm.deck import Impact
-from fecm.problem import NoCurveError, Problem, load_deck, nonlinear_curve
-from fecm.results import MemorySink
-from fecm.simulation import Simulation, run_program
-from fecm.studies import quick_estimate, velocity_at
-from fecm.sweeps import in_full, price, tasks
+from fecm.authoring.case import Case
+from fecm.deck.model import Impact
+from fecm.problem.estimates import NoCurveError, nonlinear_curve
+from fecm.problem.loading import load_deck
+from fecm.problem.problem import Problem
+from fecm.results.sinks import MemorySink
+from fecm.simulation.run import run_program
+from fecm.simulation.simulation import Simulation
+from fecm.studies.estimate import quick_estimate, velocity_at
+from fecm.sweeps import in_full, price
 from fecm.sweeps.plan import plan
+from fecm.sweeps.task import tasks
 from tests.calls import call
 from tests.test_nonlinear_decks import STRUCK, forces, text
 

@@ -14,10 +14,13 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck import SUPPORTS, Impact, Indentation, Material, Patch, format_deck
-from fecm.mechanics import MeshArrays, static_stiffness
-from fecm.problem import load_deck
+from fecm.deck.format import format_deck
+from fecm.deck.grid import SUPPORTS
+from fecm.deck.model import Impact, Indentation, Material, Patch
+from fecm.mechanics.mesh import MeshArrays
+from fecm.mechanics.solutions import static_stiffness
 from fecm.problem.generate import generate
+from fecm.problem.loading import load_deck
 from tests.builders import DATA, table
 from tests.calls import assert_unusable, call
 from tests.patches import STRAIN, residual, stretched

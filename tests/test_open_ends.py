@@ -10,7 +10,7 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.results import run_summary
+from fecm.results.summary import run_summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, small
 

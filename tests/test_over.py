@@ -13,7 +13,7 @@ import fecm
 from fecm import Deck
 from fecm.deck.model import Macro
 from fecm.mechanics.impact_steps import ImpactSteps
-from fecm.results import End
+from fecm.results.end import End
 from tests.calls import call
 from tests.decks import LONG, model, small
 from tests.stopped_runs import StoppedError

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import fecm
-from fecm.deck import COEFFICIENT, DENSITY, MASS, MODULUS, TOUGHNESS, VELOCITY, convert
+from fecm.deck.units import COEFFICIENT, DENSITY, MASS, MODULUS, TOUGHNESS, VELOCITY, convert
 from tests.decks import ROOT
 
 DOCS = ROOT / "docs"

@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fecm.mechanics import DISC, HERTZ, MeshArrays, PatchError, PlateModel, Tangent, patch_weights
 from fecm.mechanics.laminate import laminate
+from fecm.mechanics.mesh import MeshArrays
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.points import DISC, HERTZ, PatchError, patch_weights
+from fecm.mechanics.solutions import Tangent
 from tests.builders import (
     REPORT_PLY,
     Floats,

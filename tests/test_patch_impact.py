@@ -9,22 +9,15 @@ import pytest
 
 import fecm
 from fecm import Ply, Result, RigidMass
-from fecm.mechanics import (
-    DISC,
-    HERTZ,
-    HystereticLaw,
-    ImpactConditions,
-    ImpactSystem,
-    LaminateSection,
-    LinearPermanent,
-    MeshArrays,
-    PlateModel,
-    PlateMotion,
-    critical_time_step,
-    patch_weights,
-    symmetry_reduction,
-)
-from fecm.mechanics.laminate import laminate
+from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
+from fecm.mechanics.impact import ImpactConditions, ImpactSystem
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.mesh import MeshArrays
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.plate_motion import PlateMotion
+from fecm.mechanics.points import DISC, HERTZ, patch_weights
+from fecm.mechanics.symmetry import symmetry_reduction
+from fecm.mechanics.time_step import critical_time_step
 from tests.builders import (
     Floats,
     mesh_on,

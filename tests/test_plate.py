@@ -8,19 +8,12 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from fecm.mechanics import (
-    HIGHEST_ORDER,
-    QUADRILATERAL,
-    PlateModel,
-    Quadrature,
-    StrainField,
-    element_blocks,
-    element_matrices,
-    gauss,
-    nodal,
-    plate,
-    stiffness_operator,
-)
+from fecm.mechanics import element_matrices, plate
+from fecm.mechanics.elements import HIGHEST_ORDER, QUADRILATERAL, Quadrature, gauss, nodal
+from fecm.mechanics.mesh import element_blocks
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.stiffness_product import stiffness_operator
+from fecm.mechanics.strains import StrainField
 from tests.builders import (
     GENERAL_ANGLES,
     GENERAL_LAYERS,

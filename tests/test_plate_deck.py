@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.authoring import ObjectError
+from fecm.authoring.parameters import ObjectError
 
 E, NU, RHO, H, SIDE = 70000.0, 0.3, 2.7e-9, 1.0, 100.0
 METAL = fecm.Laminate([0], fecm.Ply(RHO, NU, E, E, *[E / (2.0 * (1.0 + NU))] * 3), H)

@@ -8,14 +8,11 @@ from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
-from fecm.mechanics import (
-    PlateModel,
-    critical_time_step,
-    element_blocks,
-    element_matrices,
-    gauss,
-    interpolation,
-)
+from fecm.mechanics import element_matrices, interpolation
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.mesh import element_blocks
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.time_step import critical_time_step
 from tests.builders import (
     GENERAL_LAYERS,
     GENERAL_PLY,

@@ -10,15 +10,11 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.results import (
-    ALL_CRITERIA,
-    ExportError,
-    NotStoredError,
-    ResultFileError,
-    dataset_csv_lines,
-    largest_exposures,
-    write_vtkhdf,
-)
+from fecm._errors import ResultFileError
+from fecm.results.criteria import ALL_CRITERIA
+from fecm.results.export import dataset_csv_lines, write_vtkhdf
+from fecm.results.exposures import largest_exposures
+from fecm.results.groups import ExportError, NotStoredError
 from tests.builders import REPORT_PLY, turned_stiffness
 from tests.calls import call
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, PROGRAM, small

@@ -14,20 +14,12 @@ import fecm
 from fecm import Result
 from fecm._errors import FecmWarning
 from fecm._typing import Array
-from fecm.plot import (
-    COLOURS,
-    MISSING,
-    Picture,
-    PlotError,
-    Support,
-    draw,
-    patches,
-    profile,
-    save_picture,
-    scale,
-    strain_points,
-    support_masks,
-)
+from fecm.plot.data import patches, strain_points
+from fecm.plot.kinds import MISSING, Picture, PlotError
+from fecm.plot.mesh import Support, support_masks
+from fecm.plot.pictures import draw, save_picture
+from fecm.plot.plate import profile
+from fecm.plot.style import COLOURS, scale
 from tests.builders import distorted_square
 from tests.decks import DATA_CARDS, DISC, MESH, small
 from tests.pictures import LONG_PROGRAM, NAMED, OF_RUNS, legend_of, lines, plot, run, ticks

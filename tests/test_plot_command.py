@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.plot import PlotError
+from fecm.plot.kinds import PlotError
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, small
 from tests.pictures import OF_RUNS

@@ -13,9 +13,11 @@ from matplotlib.collections import PolyCollection
 import fecm
 from fecm import Result
 from fecm.deck import model
-from fecm.plot import NAMES, PlotError
-from fecm.problem import deck_summary, load_deck
-from fecm.results import write_vtkhdf
+from fecm.plot.failure import NAMES
+from fecm.plot.kinds import PlotError
+from fecm.problem.loading import load_deck
+from fecm.problem.summary import deck_summary
+from fecm.results.export import write_vtkhdf
 from tests.pictures import legend_of, plot
 from tests.test_failure_runs import of_fabric
 from tests.test_several_materials import HYBRID, impact, materials, unlike

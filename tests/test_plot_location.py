@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.location import Candidate
-from fecm.plot import PlotError, draw, location_picture
+from fecm.location.location import Candidate
+from fecm.plot.kinds import PlotError
+from fecm.plot.location import location_picture
+from fecm.plot.pictures import draw
 from tests.calls import call
 from tests.decks import DATA_CARDS, model, small
 from tests.pictures import legend_of_axes, lines, run

@@ -10,9 +10,13 @@ import pytest
 from fecm import Result
 from fecm._errors import FecmWarning
 from fecm._typing import Array
-from fecm.mechanics import CRITERIA
-from fecm.plot import PlotError, draw, outline
-from fecm.results import ALL_CRITERIA, largest_exposures, run_summary
+from fecm.mechanics.failure import CRITERIA
+from fecm.plot.failure import outline
+from fecm.plot.kinds import PlotError
+from fecm.plot.pictures import draw
+from fecm.results.criteria import ALL_CRITERIA
+from fecm.results.exposures import largest_exposures
+from fecm.results.summary import run_summary
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, PROGRAM, small
 from tests.pictures import legend_of, plot, run
 

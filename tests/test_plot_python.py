@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.plot import KINDS, PlotError, Shows, draw
-from fecm.results import RunKind, SweepKind
+from fecm.plot.kinds import KINDS, PlotError, Shows
+from fecm.plot.pictures import draw
+from fecm.results.pictures import RunKind, SweepKind
 from tests.calls import call
 from tests.decks import APPENDIX, DATA_CARDS, PROGRAM, small
 from tests.pictures import OF_RUNS

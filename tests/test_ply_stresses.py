@@ -9,19 +9,17 @@ import numpy as np
 import pytest
 
 from fecm import Ply
-from fecm.mechanics import (
-    LaminateSection,
-    MeshArrays,
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.mesh import MeshArrays, element_blocks
+from fecm.mechanics.ply_stresses import (
     PlyStresses,
-    containing_elements,
-    element_blocks,
     equilibrium_shear_stiffness,
-    gauss,
     in_plane_stresses,
     interlaminar_stresses,
     second_derivatives,
 )
-from fecm.mechanics.laminate import laminate
+from fecm.mechanics.points import containing_elements
 from tests.builders import (
     DATA,
     GENERAL_ANGLES,

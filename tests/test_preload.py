@@ -16,27 +16,26 @@ import pytest
 
 import fecm
 from fecm import Deck, Ply, Result, _machine
-from fecm.authoring import Case, apply_case, check_deck
-from fecm.deck import ElementGrid, Impact, Material, Patch, Preload, Projectile, uniform_section
-from fecm.mechanics import (
-    UNLOADED,
-    LaminateSection,
-    PlateModel,
-    buckling_factor,
-    critical_time_step,
-    element_blocks,
-    element_matrices,
-    largest_in_plies,
-    modes,
-    safe_time_step,
-    stiffness_operator,
-    uniform_stresses,
-)
-from fecm.mechanics.laminate import laminate
-from fecm.problem import clamped_frequency, deck_summary, load_deck, strengths_of_deck
-from fecm.results import run_summary
-from fecm.simulation import Solver
-from fecm.studies import quick_estimate
+from fecm.authoring.case import Case, check_deck
+from fecm.authoring.values import apply_case
+from fecm.deck.grid import ElementGrid, uniform_section
+from fecm.deck.model import Impact, Material, Patch, Preload, Projectile
+from fecm.mechanics import element_matrices
+from fecm.mechanics.failure import largest_in_plies
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.mesh import element_blocks
+from fecm.mechanics.plate import UNLOADED, PlateModel
+from fecm.mechanics.ply_stresses import uniform_stresses
+from fecm.mechanics.solutions import buckling_factor, modes
+from fecm.mechanics.stiffness_product import stiffness_operator
+from fecm.mechanics.time_step import critical_time_step, safe_time_step
+from fecm.problem.loading import load_deck
+from fecm.problem.parts import strengths_of_deck
+from fecm.problem.rules.time_step import clamped_frequency
+from fecm.problem.summary import deck_summary
+from fecm.results.summary import run_summary
+from fecm.simulation.job import Solver
+from fecm.studies.estimate import quick_estimate
 from fecm.verification import decks
 from tests import stopped_runs
 from tests.builders import (

@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 
 from fecm import _machine
-from fecm.sweeps import METHODS, Outcome, Settings, Task, execute
+from fecm.sweeps import execute
+from fecm.sweeps.methods import METHODS
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.task import Settings, Task
 from tests.decks import model, small
 
 

@@ -11,12 +11,16 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.deck import Findings, Macro, compile_program, estimate_work
-from fecm.listing import Mode
-from fecm.mechanics import critical_time_step
-from fecm.problem import RunOptions, load_deck
-from fecm.results import MemorySink
-from fecm.simulation import Action, Interpreter, simulate
+from fecm.deck.findings import Findings
+from fecm.deck.macros import compile_program, estimate_work
+from fecm.deck.model import Macro
+from fecm.listing.slips import Mode
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.build import RunOptions
+from fecm.problem.loading import load_deck
+from fecm.results.sinks import MemorySink
+from fecm.simulation.interpreter import Action, Interpreter
+from fecm.simulation.run import simulate
 from tests.decks import DATA_CARDS, PROGRAM, ready, small
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fecm import Rod
-from fecm.mechanics import RodState, WilsonStep, report_rod, rigid_approach
+from fecm.mechanics.projectile import RodState, WilsonStep, report_rod, rigid_approach
 from tests.builders import displacement
 
 

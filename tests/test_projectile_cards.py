@@ -11,11 +11,10 @@ from scipy.integrate import solve_ivp
 
 import fecm
 from fecm import Ply, Result, RigidMass, Rod
-from fecm.deck import (
+from fecm.deck.grid import ElementGrid, GridSection
+from fecm.deck.model import (
     Control,
     Deck,
-    ElementGrid,
-    GridSection,
     Impact,
     Indentation,
     Integration,
@@ -24,10 +23,12 @@ from fecm.deck import (
     Material,
     Projectile,
 )
-from fecm.mechanics import gages, report_rod
-from fecm.problem import build_plate, build_projectile, load_deck
+from fecm.mechanics.points import gages
+from fecm.mechanics.projectile import report_rod
 from fecm.problem.generate import generate
-from fecm.results import dataset_csv_lines
+from fecm.problem.loading import load_deck
+from fecm.problem.parts import build_plate, build_projectile
+from fecm.results.export import dataset_csv_lines
 from tests.decks import DATA_CARDS, LONG, MESH, OWN_FINDINGS, small
 
 Floats = NDArray[np.float64]

@@ -23,7 +23,7 @@ import pytest
 
 import fecm
 from fecm import ContactPoint
-from fecm.deck import HDF5
+from fecm.deck.reader import HDF5
 from tests.calls import call
 from tests.decks import APPENDIX, DATA_CARDS, DISC, LONG, PLY_PROGRAM, PROGRAM, ROOT, small
 

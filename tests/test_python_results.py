@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results import METRICS, MetricAttributes
-from fecm.sweeps import SchedulerError
+from fecm.results.metrics import METRICS, MetricAttributes
+from fecm.sweeps.execute import SchedulerError
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, ROOT, small
 
 UNITS = "UNIT\nin lbf s\n"

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fecm.mechanics import HIGHEST_ORDER, QUADRILATERAL, Quadrature, gauss, nodal
+from fecm.mechanics.elements import HIGHEST_ORDER, QUADRILATERAL, Quadrature, gauss, nodal
 from tests.builders import Bools, Floats
 from tests.patches import PATTERNS
 

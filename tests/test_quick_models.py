@@ -16,20 +16,19 @@ from scipy.special import beta, ellipk
 
 import fecm
 from fecm import Ply, Result
-from fecm.mechanics import (
+from fecm.mechanics import quick_models
+from fecm.mechanics.laminate import (
     SMALL_MASS,
     LaminateSection,
     effective_rigidity,
-    inelasticity,
-    infinite_plate,
-    quick_models,
-    static_plate,
-    static_stiffness,
+    laminate,
     threshold_force,
 )
-from fecm.mechanics.laminate import laminate
-from fecm.problem import load_deck, wave_impedance
-from fecm.results import run_summary
+from fecm.mechanics.quick_models import inelasticity, infinite_plate, static_plate
+from fecm.mechanics.solutions import static_stiffness
+from fecm.problem.contact_estimates import wave_impedance
+from fecm.problem.loading import load_deck
+from fecm.results.summary import run_summary
 from fecm.verification.decks import run_of_deck
 from fecm.verification.impacts import struck_square
 from tests.builders import REPORT_ANGLES, report_plate, table

@@ -14,7 +14,7 @@ import pytest
 
 import fecm
 from fecm._errors import FecmWarning
-from fecm.listing import LISTING, NAMES
+from fecm.listing.slips import LISTING, NAMES
 from fecm.mechanics import kernels
 from tests.builders import distorted_square, simple_support, square
 from tests.test_element_decks import deck

@@ -13,9 +13,10 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.authoring import CasesError
-from fecm.results import ResultFileError
-from fecm.sweeps import DESIGNS, Design, DesignKind, ValueDistribution, correlation_of, matrix
+from fecm._errors import ResultFileError
+from fecm.authoring.case import CasesError
+from fecm.sweeps.distributions import ValueDistribution
+from fecm.sweeps.random import DESIGNS, Design, DesignKind, correlation_of, matrix
 from tests.calls import call
 from tests.decks import DATA_CARDS, small
 

@@ -13,23 +13,13 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.authoring import CasesError
-from fecm.problem import load_deck
-from fecm.results import ResultFileError
-from fecm.sweeps import (
-    DESIGNS,
-    QUANTILES,
-    Design,
-    DesignKind,
-    Indices,
-    ValueDistribution,
-    indices,
-    matrix,
-    random_cases,
-    unit_samples,
-    wilson,
-)
+from fecm._errors import ResultFileError
+from fecm.authoring.case import CasesError
+from fecm.problem.loading import load_deck
+from fecm.sweeps.distributions import ValueDistribution
 from fecm.sweeps.plan import plan
+from fecm.sweeps.random import DESIGNS, Design, DesignKind, matrix, random_cases, unit_samples
+from fecm.sweeps.statistics import QUANTILES, Indices, indices, wilson
 from tests.calls import Done, assert_unusable, call
 from tests.decks import DATA, DATA_CARDS, small
 from tests.pictures import footer_of
@@ -538,7 +528,7 @@ def test_the_line_of_doubtful_draws_is_not_cut(
     folder: Path, kind: str, width: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot import draw
+    from fecm.plot.pictures import draw
 
     words = "beyond the linear plate and a few other limits of the model (w > 0.3 h)"
     monkeypatch.setattr(
@@ -553,7 +543,7 @@ def test_the_line_of_doubtful_draws_is_not_cut(
 
 def test_the_picture_of_exceedance_goes_through_the_probabilities(folder: Path) -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot import draw
+    from fecm.plot.pictures import draw
 
     loaded = fecm.load_sweep(folder / "one.h5")
     assert loaded.random is not None

@@ -13,7 +13,7 @@ import pytest
 import fecm
 from fecm._record_faults import record_faults
 from fecm._typing import Floats
-from fecm.results import measurement_of
+from fecm.results.comparison import measurement_of
 from tests.calls import call
 from tests.decks import ROOT
 

@@ -9,27 +9,23 @@ import pytest
 from scipy.special import ellipk
 
 from fecm import ContactPoint
-from fecm.mechanics import (
-    DISC,
-    FLAT,
-    Curvature,
-    HystereticLaw,
-    LaminateSection,
-    LinearPermanent,
-    MembraneForces,
-    PlateModel,
+from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
+from fecm.mechanics.laminate import LaminateSection
+from fecm.mechanics.membrane import MembraneForces
+from fecm.mechanics.mesh import equation_numbers
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.points import DISC, patch_weights
+from fecm.mechanics.reduced_plate import (
     ReducedMotion,
     ReducedPlate,
     ReductionError,
     SeriesLaw,
-    Tangent,
+    _moved_eigenvectors,
     bending_modes,
-    equation_numbers,
-    modes,
-    patch_weights,
-    static_stiffness,
+    reduced_plate,
 )
-from fecm.mechanics.reduced_plate import _moved_eigenvectors, reduced_plate
+from fecm.mechanics.solutions import Tangent, modes, static_stiffness
+from fecm.mechanics.strains import FLAT, Curvature
 from tests.builders import (
     Floats,
     boundary,

@@ -12,23 +12,18 @@ import pytest
 
 import fecm
 from fecm import RigidMass
-from fecm.authoring import CasesError, strike_of
-from fecm.mechanics import HystereticLaw, LinearPermanent, ReducedPlate
-from fecm.problem import load_deck
-from fecm.results import RATIO
-from fecm.sweeps import (
-    Hits,
-    ReducedImpacts,
-    ReducedModel,
-    Task,
-    by_halvings,
-    count_held,
-    execute,
-    impacts_from_cards,
-    tasks,
-)
+from fecm.authoring.case import CasesError
+from fecm.authoring.strike_values import strike_of
+from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
+from fecm.mechanics.reduced_plate import ReducedPlate
+from fecm.problem.loading import load_deck
+from fecm.results.metrics import RATIO
+from fecm.sweeps import execute
+from fecm.sweeps.impact_columns import impacts_from_cards
 from fecm.sweeps.plan import plan
-from fecm.sweeps.reduced import reduced
+from fecm.sweeps.reduced import ReducedImpacts, ReducedModel, by_halvings, count_held, reduced
+from fecm.sweeps.responses import Hits
+from fecm.sweeps.task import Task, tasks
 from tests.builders import table
 from tests.calls import call
 from tests.nonlinear_impacts import struck_rectangle

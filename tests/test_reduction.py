@@ -9,16 +9,11 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.deck import Deck, Forces, Impact, NodeValues
-from fecm.mechanics import (
-    ElementProduct,
-    SymmetryReduction,
-    Workers,
-    stiffness_operator,
-    stiffness_product,
-    symmetry_reduction,
-)
-from fecm.problem import build_plate
+from fecm.deck.model import Deck, Forces, Impact, NodeValues
+from fecm.mechanics import stiffness_product
+from fecm.mechanics.stiffness_product import ElementProduct, Workers, stiffness_operator
+from fecm.mechanics.symmetry import SymmetryReduction, symmetry_reduction
+from fecm.problem.parts import build_plate
 from tests.builders import Floats
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small
 

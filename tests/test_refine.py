@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck import Deck
-from fecm.mechanics import PlateModel
-from fecm.problem import RefineError, load_deck, refined_deck
+from fecm.deck.model import Deck
+from fecm.mechanics.plate import PlateModel
 from fecm.problem.generate import generate
+from fecm.problem.loading import load_deck
+from fecm.problem.refine import RefineError, refined_deck
 from tests.decks import LONG, MESH, small
 
 

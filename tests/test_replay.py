@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm import Result
-from fecm.deck import ElementGrid, GridSection, Indentation, Material
-from fecm.listing import tape_texts
-from fecm.mechanics import ImpactSystem, PlateMotion
-from fecm.simulation import restore, saved_values
+from fecm.deck.grid import ElementGrid, GridSection
+from fecm.deck.model import Indentation, Material
+from fecm.listing.tapes import tape_texts
+from fecm.mechanics.impact import ImpactSystem
+from fecm.mechanics.plate_motion import PlateMotion
+from fecm.simulation.saved import restore, saved_values
 from fecm.verification.decks import run_of_deck, struck_plate
 from tests.decks import APPENDIX, DATA, LONG, ready
 

@@ -16,9 +16,13 @@ from hypothesis import strategies as st
 import fecm
 from fecm import Result
 from fecm._table import Table
-from fecm.deck import layup_text, parse_layup
-from fecm.report import page_of, render
-from fecm.results import ALL_CRITERIA, METRICS, first_failures, run_summary
+from fecm.deck.layup import layup_text, parse_layup
+from fecm.report.content import render
+from fecm.report.report import page_of
+from fecm.results.criteria import ALL_CRITERIA
+from fecm.results.exposures import first_failures
+from fecm.results.metrics import METRICS
+from fecm.results.summary import run_summary
 from tests.calls import assert_unusable, call
 from tests.decks import LONG, ROOT, small
 from tests.pages import Page, agrees, read_page

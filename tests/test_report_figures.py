@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.studies import Fronts
+from fecm.studies.waves import Fronts
 from tests.calls import assert_unusable, call, rows
 from tests.decks import DATA_CARDS, LONG, PROGRAM, small
 
@@ -103,7 +103,7 @@ def test_the_rigidities_of_a_named_law_need_no_deck() -> None:
 
 
 def test_the_picture_of_rigidities_has_the_indentation_along_and_the_rigidity_up() -> None:
-    from fecm.plot import rigidity_picture
+    from fecm.plot.studies import rigidity_picture
 
     peaks, units = np.array([1e-3, 2e-3, 4e-3]), {"length": "in", "force": "lbf"}
     (axes,) = rigidity_picture(peaks, {"3-7": 1.0 / peaks}, 2.5, units).figure.axes

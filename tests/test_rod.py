@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm import Rod
-from fecm.mechanics import AVERAGE, CONSISTENT, report_rod
-from fecm.studies import (
-    Filter,
+from fecm.mechanics.projectile import AVERAGE, CONSISTENT, report_rod
+from fecm.studies.rod_test.filters import Filter
+from fecm.studies.rod_test.pulse_test import (
     Pulse,
     RodHistory,
     default_time_step,
@@ -363,7 +363,7 @@ def test_pictures_are_drawn_beside_the_numbers(tmp_path: Path, result: Path) -> 
 
 def test_the_picture_of_a_pulse_shows_its_forces_and_accelerations() -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot import pulse_picture
+    from fecm.plot.studies import pulse_picture
 
     history = simulate_pulse(rod(), GAUSS, 2e-7, 600e-6, (0.5,))
     units = {"length": "in", "force": "lbf", "time": "s"}

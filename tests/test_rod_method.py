@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 
 import fecm
 from fecm import Result, Rod
-from fecm.mechanics import (
+from fecm.mechanics.projectile import (
     AVERAGE,
     CONSISTENT,
     INTEGRATORS,

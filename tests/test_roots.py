@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from fecm.mechanics import root
+from fecm.mechanics.roots import root
 
 
 @pytest.mark.parametrize(

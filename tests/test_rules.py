@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck import Rule, Subject, declare
-from fecm.problem import all_rules, load_deck
-from fecm.problem.findings_page import findings_page
+from fecm.deck.rules import Rule, Subject, declare
+from fecm.problem.findings_page import all_rules, findings_page
+from fecm.problem.loading import load_deck
 from tests import decks
 from tests.builders import square
 from tests.decks import DATA, DATA_CARDS, MESH, PLY_PROGRAM, PROGRAM, ROOT, small

@@ -19,9 +19,11 @@ import pytest
 
 import fecm
 from fecm import Ply, Result, Strengths
-from fecm.deck import (
-    MATERIALS,
-    ElementGrid,
+from fecm._errors import ResultFileError
+from fecm.deck import model
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.grid import ElementGrid, grid_lines, uniform_section
+from fecm.deck.model import (
     Integration,
     LaminateNumber,
     Laminates,
@@ -34,27 +36,18 @@ from fecm.deck import (
     Shear,
     Zone,
     Zones,
-    grid_lines,
-    model,
-    uniform_section,
 )
-from fecm.mechanics import (
-    CRITERIA,
-    LIBRARY,
-    UNKNOWN,
-    CompiledMonitor,
-    FailureMonitor,
-    LaminateSection,
-    PlyStresses,
-    equation_numbers,
-    equilibrium_shear_stiffness,
-    residual_stresses,
-    symmetry_reduction,
-)
-from fecm.mechanics.laminate import laminate
-from fecm.problem import load_deck, strengths_of_deck
-from fecm.results import ResultFileError
-from fecm.simulation import Solver
+from fecm.mechanics.failure import CRITERIA
+from fecm.mechanics.failure_monitor import UNKNOWN, FailureMonitor
+from fecm.mechanics.kernels import LIBRARY
+from fecm.mechanics.kernels.failure import CompiledMonitor
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.mesh import equation_numbers
+from fecm.mechanics.ply_stresses import PlyStresses, equilibrium_shear_stiffness, residual_stresses
+from fecm.mechanics.symmetry import symmetry_reduction
+from fecm.problem.loading import load_deck
+from fecm.problem.parts import strengths_of_deck
+from fecm.simulation.job import Solver
 from fecm.verification import decks
 from tests.builders import Floats, table
 from tests.decks import DATA

@@ -14,14 +14,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fecm.mechanics import (
-    ConvergenceError,
-    PlateModel,
-    StaticCurve,
-    curved_plate,
-    static_curve,
-    static_plate,
-)
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.quick_models import StaticCurve, curved_plate, static_curve, static_plate
+from fecm.mechanics.solutions import ConvergenceError
 from tests.builders import Floats, table
 from tests.nonlinear_plates import disc, patch, rectangle
 from tests.test_nonlinear_statics import LAMINATES, isotropic

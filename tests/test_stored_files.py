@@ -14,7 +14,11 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results import FILES, Form, MemorySink, ResultFileError, dataset_of, read, result_writing
+from fecm._errors import ResultFileError
+from fecm.results.hdf5_reader import read
+from fecm.results.hdf5_writer import result_writing
+from fecm.results.schema import FILES, Form, dataset_of
+from fecm.results.sinks import MemorySink
 from tests.decks import LONG, small
 from tests.panels import TIME, scatter, struck
 from tests.test_nonlinear_decks import text

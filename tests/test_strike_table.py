@@ -7,7 +7,9 @@ import pytest
 
 import fecm
 from fecm import Deck
-from fecm.authoring import Case, Strike, strike_of_case
+from fecm.authoring.case import Case
+from fecm.authoring.strike_values import Strike
+from fecm.authoring.values import strike_of_case
 from fecm.sweeps import backends, impact_columns
 from tests.decks import model, small
 

@@ -22,29 +22,23 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm import ContactPoint, SweepResult
-from fecm.authoring import Case, CasesError, apply_case
-from fecm.deck import Deck
-from fecm.mechanics import AppliedForce, HystereticLaw, LinearPermanent, stack_parameters
-from fecm.problem import build_law, build_model, build_projectile, load_deck, sole_problem
-from fecm.sweeps import (
-    LOST,
-    Convolution,
-    Means,
-    OtherSweepError,
-    Outcome,
-    PartialResults,
-    Task,
-    carry_out_plan,
-    execute,
-    grid_cases,
-    on_workers,
-    parse_vary,
-    plate_response,
-    read_cases,
-    shares_plate,
-    tasks,
-)
+from fecm.authoring.case import Case, CasesError
+from fecm.authoring.values import apply_case
+from fecm.deck.model import Deck
+from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent, stack_parameters
+from fecm.mechanics.plate_motion import AppliedForce
+from fecm.problem.build import build_model
+from fecm.problem.loading import load_deck, sole_problem
+from fecm.problem.parts import build_law, build_projectile
+from fecm.sweeps import execute
+from fecm.sweeps.backends import shares_plate
+from fecm.sweeps.case_tables import grid_cases, parse_vary, read_cases
+from fecm.sweeps.execute import LOST, Means, carry_out_plan, on_workers
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.partial_results import OtherSweepError, PartialResults
 from fecm.sweeps.plan import plan
+from fecm.sweeps.responses import Convolution, plate_response
+from fecm.sweeps.task import Task, tasks
 from tests.calls import Done, call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, model, small
 from tests.stopped_runs import StoppedError

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.authoring import Case, apply_case
-from fecm.problem import Problem, load_deck
-from fecm.sweeps import JUDGED, doubtful_values
+from fecm.authoring.case import Case
+from fecm.authoring.values import apply_case
+from fecm.problem.loading import load_deck
+from fecm.problem.problem import Problem
+from fecm.sweeps.checks import JUDGED, doubtful_values
 from tests.sound_plate import base, replaced, with_card
 
 

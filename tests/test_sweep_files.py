@@ -15,8 +15,8 @@ import pytest
 
 import fecm
 from fecm import SweepResult
-from fecm.authoring import CasesError
-from fecm.sweeps import sweep_summary
+from fecm.authoring.case import CasesError
+from fecm.sweeps.summary import sweep_summary
 from tests.calls import assert_unusable, call, datasets_of
 from tests.decks import DATA_CARDS, PROGRAM
 from tests.decks import small as small_of

@@ -12,20 +12,13 @@ import pytest
 
 import fecm
 from fecm import DivergenceError, RigidMass
-from fecm.authoring import apply_case
-from fecm.deck import Deck
-from fecm.mechanics import HystereticLaw, LinearPermanent, stack_parameters
-from fecm.results import SUMMARY
-from fecm.sweeps import (
-    ComputedImpacts,
-    Hits,
-    Status,
-    TipSteps,
-    backends,
-    balance_errors,
-    by_numpy,
-    impacts,
-)
+from fecm.authoring.values import apply_case
+from fecm.deck.model import Deck
+from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent, stack_parameters
+from fecm.results.metrics import SUMMARY
+from fecm.sweeps import backends
+from fecm.sweeps.outcome import Status
+from fecm.sweeps.responses import ComputedImpacts, Hits, TipSteps, balance_errors, by_numpy, impacts
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, PROGRAM, small
 

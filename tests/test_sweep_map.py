@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 import fecm
 from fecm import SweepResult
 from fecm._errors import FecmWarning
-from fecm.plot import PlotError, draw
-from fecm.sweeps import save_sweep
+from fecm.plot.kinds import PlotError
+from fecm.plot.pictures import draw
+from fecm.sweeps.files import save_sweep
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small
 from tests.pictures import OF_RUNS, footer_of

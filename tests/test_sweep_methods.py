@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.problem import Problem
-from fecm.sweeps import METHODS, Method, Outcome, Plan, Settings, Task, methods, tasks
+from fecm.problem.problem import Problem
+from fecm.sweeps import methods
+from fecm.sweeps.methods import METHODS
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.task import Method, Plan, Settings, Task, tasks
 from tests.decks import DATA_CARDS, small
 from tests.test_failure_values import weak
 from tests.test_nonlinear_sweeps import DECK

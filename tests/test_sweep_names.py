@@ -12,11 +12,15 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.authoring import VARIABLES, Case, CasesError, Changes, apply_case
-from fecm.deck import Deck, Impact, Indentation, Material, Patch
+from fecm.authoring.case import Case, CasesError
+from fecm.authoring.values import VARIABLES, Changes, apply_case
+from fecm.deck.model import Deck, Impact, Indentation, Material, Patch
 from fecm.problem.generate import generate
-from fecm.results import ALL_CRITERIA, largest_exposures
-from fecm.sweeps import methods, parse_vary, read_cases, sweep_summary
+from fecm.results.criteria import ALL_CRITERIA
+from fecm.results.exposures import largest_exposures
+from fecm.sweeps import methods
+from fecm.sweeps.case_tables import parse_vary, read_cases
+from fecm.sweeps.summary import sweep_summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, model, small
 

@@ -19,23 +19,15 @@ import pytest
 
 import fecm
 from fecm._files import OutputError, beside
-from fecm.authoring import with_time_step
-from fecm.problem import sole_problem
-from fecm.sweeps import (
-    LOST,
-    DamagedPartError,
-    OtherSweepError,
-    Outcome,
-    PartialResults,
-    Plan,
-    Task,
-    carry_out_plan,
-    execute,
-    grid_cases,
-    run_task,
-    tasks,
-)
+from fecm.authoring.time_values import with_time_step
+from fecm.problem.loading import sole_problem
+from fecm.sweeps import execute
+from fecm.sweeps.case_tables import grid_cases
+from fecm.sweeps.execute import LOST, carry_out_plan
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.partial_results import DamagedPartError, OtherSweepError, PartialResults
 from fecm.sweeps.plan import plan
+from fecm.sweeps.task import Plan, Task, run_task, tasks
 from tests.calls import Done, assert_unusable, call
 from tests.decks import DATA_CARDS, model, small
 from tests.kill_runs import SWEEP, SWEPT

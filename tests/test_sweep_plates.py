@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.authoring import apply_case
-from fecm.deck import Boundary, Deck
-from fecm.mechanics import critical_time_step
-from fecm.problem import is_coupled, load_deck
+from fecm.authoring.values import apply_case
+from fecm.deck.model import Boundary, Deck
+from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.generate import generate
+from fecm.problem.loading import load_deck
+from fecm.problem.parts import is_coupled
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, model, small
 
@@ -131,7 +132,7 @@ def test_in_plane_unknowns_that_rest_do_not_limit_the_time_step() -> None:
 
 
 def _critical(deck: Deck) -> list[str]:
-    from fecm.problem import deck_summary
+    from fecm.problem.summary import deck_summary
 
     made = deck_summary(load_deck(deck).problems[0])
     return [line for line in made.lines() if "critical" in line]

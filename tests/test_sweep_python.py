@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.authoring import CasesError
-from fecm.sweeps import SchedulerError
+from fecm.authoring.case import CasesError
+from fecm.sweeps.execute import SchedulerError
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small
 

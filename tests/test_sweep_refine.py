@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm import Deck, SweepResult
-from fecm.authoring import CasesError
-from fecm.deck import Patch
-from fecm.sweeps import Convergence
-from fecm.sweeps.convergence import convergence
+from fecm.authoring.case import CasesError
+from fecm.deck.model import Patch
+from fecm.sweeps.convergence import Convergence, convergence
 from tests.builders import REPORT_PLY, table
 from tests.calls import assert_unusable, call
 from tests.decks import small

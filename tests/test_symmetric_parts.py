@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck import Finding, model
-from fecm.problem import load_deck
+from fecm._errors import StudyError
+from fecm.deck import model
+from fecm.deck.findings import Finding
 from fecm.problem.generate import generate
-from fecm.results import largest_exposures
-from fecm.studies import StudyError
+from fecm.problem.loading import load_deck
+from fecm.results.exposures import largest_exposures
 from tests.calls import call
 from tests.symmetric_parts import mesh_of, part_of, whole_deck, window_deck, with_segments
 from tests.test_nonlinear_cards import with_codes

@@ -15,24 +15,15 @@ import pytest
 
 import fecm
 from fecm import Deck, read_deck
-from fecm.deck import (
-    Card,
-    CardTable,
-    Control,
-    FieldKind,
-    Fields,
-    Findings,
-    Reader,
-    TableReader,
-    format_deck,
-    format_real,
-    layout,
-    read_values,
-    write_rows,
-)
-from fecm.deck.card import _format_numeral
+from fecm.deck.card import Card, FieldKind, Fields, _format_numeral, format_real, layout
+from fecm.deck.findings import Findings
+from fecm.deck.format import format_deck
 from fecm.deck.mesh_cards import Boundary, Coordinates, Elements, Forces
+from fecm.deck.model import Control
+from fecm.deck.reader import Reader
 from fecm.deck.segment import NumberedSegment
+from fecm.deck.table import CardTable, TableReader, write_rows
+from fecm.deck.values import read_values
 from fecm.problem.generate import generate
 from tests.decks import ROOT, small
 from tests.fuzz_decks import FORC, OWN, mutate

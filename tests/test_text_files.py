@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import fecm
-from fecm.deck import format_deck
+from fecm.deck.format import format_deck
 from tests.calls import assert_unusable, call
 from tests.decks import small
 

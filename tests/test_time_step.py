@@ -12,18 +12,16 @@ from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
-from fecm.mechanics import (
-    ElementBlock,
-    PlateModel,
+from fecm.mechanics import element_matrices, kernels, time_step
+from fecm.mechanics.mesh import ElementBlock
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.time_step import (
     critical_time_step,
     eigenvalue_bounds,
-    element_matrices,
-    kernels,
     safe_time_step,
     taken_time_step,
-    time_step,
 )
-from fecm.problem import load_deck
+from fecm.problem.loading import load_deck
 
 from .builders import (
     distorted_square,

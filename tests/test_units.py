@@ -6,7 +6,7 @@ import pytest
 
 import fecm
 from fecm._text import significant
-from fecm.deck import quantity, unit_names
+from fecm.deck.units import quantity, unit_names
 from tests.decks import small
 
 

@@ -13,9 +13,10 @@ from scipy.integrate import solve_ivp
 
 import fecm
 from fecm import Deck
-from fecm.deck import Material
-from fecm.mechanics import LinearPermanent, element_matrices
+from fecm.deck.model import Material
+from fecm.mechanics import element_matrices
 from fecm.mechanics import laminate as laminates
+from fecm.mechanics.contact_law import LinearPermanent
 from fecm.problem.generate import generate
 from fecm.verification import CASES, chosen, compute_rows, stretching
 from fecm.verification.case import HEAD, Case, Check, Label, Row, cells, verification_page

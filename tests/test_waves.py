@@ -10,9 +10,8 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from fecm import Ply
-from fecm.mechanics import LaminateSection
-from fecm.mechanics.laminate import laminate
-from fecm.studies import FRONTS, MODES, Medium, WaveSurfaces, dispersion
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from tests.builders import (
     GENERAL_PLY,
     REPORT_PLY,

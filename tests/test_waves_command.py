@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.plot import PlotError
-from fecm.studies import FRONTS, MODES, Medium, WaveSurfaces, dispersion
+from fecm.plot.kinds import PlotError
+from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from tests.builders import general_plate, report_plate, table
 from tests.calls import assert_unusable, call, rows
 from tests.decks import DATA_CARDS, LONG, small
@@ -233,7 +233,7 @@ def drawn(axes: Any) -> list[Any]:
 
 def test_the_picture_of_dispersion_shows_scaled_velocities_and_frequencies() -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot import dispersion_picture
+    from fecm.plot.studies import dispersion_picture
 
     medium = Medium(report_plate())
     curves = [dispersion(medium, angle, np.linspace(0.5, 20.0, 40)) for angle in (0.0, 90.0)]
@@ -255,7 +255,7 @@ def test_the_picture_of_dispersion_shows_scaled_velocities_and_frequencies() -> 
 
 def test_the_picture_of_speeds_is_polar_and_in_the_decks_units() -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot import speeds_picture
+    from fecm.plot.studies import speeds_picture
 
     surfaces = WaveSurfaces(Medium(report_plate()))
     units = {"length": "in", "force": "lbf", "time": "s"}
@@ -270,7 +270,7 @@ def test_the_picture_of_speeds_is_polar_and_in_the_decks_units() -> None:
 
 def test_the_picture_of_fronts_shows_circle_rays_fronts_and_cusps() -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot import fronts_picture
+    from fecm.plot.studies import fronts_picture
 
     surfaces = WaveSurfaces(Medium(report_plate()))
     times = (2e-6, 1e-5)

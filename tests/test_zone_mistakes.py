@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fecm.problem import load_deck
+from fecm.problem.loading import load_deck
 from tests.decks import DATA_CARDS, small
 
 WORDS = """MATS

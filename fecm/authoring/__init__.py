@@ -6,7 +6,3 @@
   ``plate_values``, ``strike_values`` and ``time_values``. ``changes`` also replaces objects.
 - ``case`` and ``parameters`` have the checks of both and their errors.
 """
-
-from fecm._lazy import names_of_stub
-
-__getattr__, __dir__ = names_of_stub(__name__, __file__)

@@ -12,6 +12,7 @@ import click
 import numpy as np
 from click import option
 
+from fecm._errors import StudyError
 from fecm._typing import Floats
 from fecm.cli.common import RefusedError, echo, note
 from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options
@@ -41,7 +42,6 @@ from fecm.mechanics.contact_law import LinearPermanent, YangSunPermanent, hertz_
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
 from fecm.problem.check import check_segment
 from fecm.problem.parts import build_constants
-from fecm.studies import StudyError
 from fecm.studies.indentation_test.curves import LIMITS_Q
 from fecm.studies.indentation_test.study import fit_law
 from fecm.studies.indentation_test.turns import read_test

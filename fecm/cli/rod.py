@@ -10,6 +10,7 @@ import click
 import numpy as np
 from click import option
 
+from fecm._errors import StudyError
 from fecm._measured_tables import read_table
 from fecm._record_faults import record_faults
 from fecm.cli.common import DASH, RefusedError, note
@@ -38,7 +39,6 @@ from fecm.mechanics.projectile import (
     MassMatrix,
     Rod,
 )
-from fecm.studies import StudyError
 from fecm.studies.rod_test import pulse_test
 from fecm.studies.rod_test.filters import FILTERS, Filter, filter_of, recorded
 from fecm.studies.rod_test.pulse_test import calibrate_transducer as fit_sensitivity

@@ -1,5 +1,1 @@
 """Decks: cards in, a typed model out, and back."""
-
-from fecm._lazy import names_of_stub
-
-__getattr__, __dir__ = names_of_stub(__name__, __file__)

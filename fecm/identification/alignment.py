@@ -8,11 +8,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._errors import FecmError
+from fecm._errors import FecmError, StudyError
 from fecm._typing import Floats
 from fecm.deck.units import KNOWN
 from fecm.results.comparison import Measurement
-from fecm.studies import StudyError
 
 OFF = 20.0  # factor between measured and computed peak or duration that shows a wrong unit
 TOP_POINTS = 3  # fewest measured points above half of the peak

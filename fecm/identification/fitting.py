@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._errors import StudyError
 from fecm._typing import Floats
 from fecm.authoring.case import Case
 from fecm.authoring.strike_values import Strike
@@ -19,7 +20,6 @@ from fecm.deck.model import Deck
 from fecm.identification.alignment import IdentifyError, contact_points
 from fecm.mechanics.contact_law import Law
 from fecm.results.comparison import Measurement
-from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter
 from fecm.sweeps.impact_columns import impacts_from_cards
 from fecm.sweeps.outcome import Backend, Outcome

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fecm._errors import warn
+from fecm._errors import StudyError, warn
 from fecm._options import described_by, documented, option
 from fecm._table import html_summary
 from fecm._typing import Floats
@@ -58,7 +58,6 @@ from fecm.problem.problem import Problem
 from fecm.results.comparison import Measurement, Source, measurement_of
 from fecm.results.validity import MEANING, Reason, reasons_of
 from fecm.simulation.job import Price
-from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import FILTERS, Filter, filter_of
 from fecm.sweeps.backends import ImpulseResponse, shares_plate
 from fecm.sweeps.outcome import Backend

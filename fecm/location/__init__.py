@@ -1,5 +1,1 @@
 """Place and force history of an impact from strain gages."""
-
-from fecm._lazy import names_of_stub
-
-__getattr__, __dir__ = names_of_stub(__name__, __file__)

@@ -1,5 +1,1 @@
 """One program, from its problem to its result."""
-
-from fecm._lazy import names_of_stub
-
-__getattr__, __dir__ = names_of_stub(__name__, __file__)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from fecm._errors import StudyError
 from fecm.deck.model import Impact
 from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity
 from fecm.mechanics.quick_models import (
@@ -24,7 +25,6 @@ from fecm.mechanics.roots import root
 from fecm.problem.estimates import NoCurveError, nonlinear_curve, whole_stiffness
 from fecm.problem.problem import Problem
 from fecm.results.validity import LIMITS
-from fecm.studies import StudyError
 
 # Mass of the projectile over the mass of the plate.
 SMALL = 0.1  # ratio below which waves control the impact

@@ -5,17 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fecm.deck import macros as deck_macros
-from fecm.mechanics import (
-    ElementProduct,
-    PlateModel,
-    PlateMotion,
-    element_matrices,
-    interpolation,
-    points,
-    strains,
-)
+from fecm.mechanics import element_matrices, interpolation, points, strains
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.plate_motion import PlateMotion
+from fecm.mechanics.stiffness_product import ElementProduct
 from fecm.problem import parts
-from fecm.simulation import Recorder
+from fecm.simulation.recorder import Recorder
 from tests.breaks import (
     Breaks,
     changed,

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import fecm
-from fecm.mechanics import (
+from fecm.mechanics import impact as impacts
+from fecm.mechanics import laminate as laminates
+from fecm.mechanics import points, quick_models, strains
+from fecm.mechanics.contact_law import (
     UNLOADING,
     VIRGIN,
     HystereticLaw,
-    ImpactSystem,
     LinearPermanent,
-    PlateMotion,
     YangSunPermanent,
-    points,
-    quick_models,
-    strains,
 )
-from fecm.mechanics import impact as impacts
-from fecm.mechanics import laminate as laminates
+from fecm.mechanics.impact import ImpactSystem
+from fecm.mechanics.plate_motion import PlateMotion
 from fecm.problem import parts
 from fecm.results import end, metrics
 from tests.breaks import (

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from fecm.deck import Cure
-from fecm.mechanics import FailureMonitor, failure, ply_stresses
+from fecm.deck.model import Cure
+from fecm.mechanics import failure, ply_stresses
 from fecm.mechanics import laminate as laminates
+from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.problem import parts
 from tests.breaks import (
     Breaks,

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fecm.mechanics import MembraneForces, QuadraticStrains, gauss, membrane, reduced_plate
+from fecm.mechanics import membrane, reduced_plate
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.membrane import MembraneForces, QuadraticStrains
 from tests.breaks import Breaks, changed, in_numpy, instead
 
 EVERY_STRIP = ("w in the middle",)

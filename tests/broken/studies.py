@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fecm.identification import fitting
-from fecm.location import Footprint, model
+from fecm.location import model
+from fecm.location.model import Footprint
 from fecm.mechanics import half_space
-from fecm.sweeps import Convolution, convergence, distributions, statistics
+from fecm.sweeps import convergence, distributions, statistics
 from fecm.sweeps import random as random_values
+from fecm.sweeps.responses import Convolution
 from tests.breaks import (
     Breaks,
     changed,

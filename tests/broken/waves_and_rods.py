@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from fecm.listing import MISREAD_DENSITY
+from fecm.listing.variant import MISREAD_DENSITY
 from fecm.mechanics import (
     projectile,
 )
-from fecm.studies import Fronts, Medium
 from fecm.studies.rod_test import pulse_test
+from fecm.studies.waves import Fronts, Medium
 from tests.breaks import (
     Breaks,
     changed,

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fecm._errors import StudyError
 from fecm._table import aligned
 from fecm._typing import Floats
 from fecm.authoring.contact import Contact
@@ -19,7 +20,6 @@ from fecm.mechanics.contact_law import (
     LinearPermanent,
     YangSunPermanent,
 )
-from fecm.studies import StudyError
 from fecm.studies.indentation_test.curves import (
     Critical,
     Curves,

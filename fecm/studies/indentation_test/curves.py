@@ -23,9 +23,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fecm._errors import StudyError
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.contact_law import ACR_POWER, LOADING_POWER, power_curve
-from fecm.studies import StudyError
 from fecm.studies.indentation_test.turns import Division, Rows, StretchKind
 
 

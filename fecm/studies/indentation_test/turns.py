@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._errors import StudyError
 from fecm._measured_tables import read_table
 from fecm._typing import Floats
-from fecm.studies import StudyError
 
 Rows = NDArray[np.int64]  # numbers of points
 

@@ -20,14 +20,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fecm._errors import warn
+from fecm._errors import StudyError, warn
 from fecm._inputs import open_input
 from fecm._measured_tables import UNITS, is_column_number, plain_unit, read_table
 from fecm._typing import Floats
 from fecm.deck.reader import HDF5
 from fecm.results.result import Result, load
 from fecm.results.schema import DATASETS
-from fecm.studies import StudyError
 
 CLASSES = ("60", "180", "600", "1000")
 ZERO_PHASE = "zero-phase"

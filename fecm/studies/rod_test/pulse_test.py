@@ -20,10 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fecm._errors import StudyError
 from fecm._measured_tables import NO_UNITS, read_table
 from fecm._typing import Floats
 from fecm.mechanics.projectile import STEPS, WILSON, Rod, RodState
-from fecm.studies import StudyError
 
 # Pulses: the two of the report, and tables --------------------------------------------------------
 

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from fecm._errors import StudyError
 from fecm._typing import Floats, Indices
-from fecm.studies import StudyError
 from fecm.studies.waves.harmonic import (
     OUT_OF_RANGE,
     Medium,

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg.lapack import dgejsv
 
+from fecm._errors import StudyError
 from fecm._typing import Floats, Indices
 from fecm.mechanics.laminate import LaminateSection
-from fecm.studies import StudyError
 
 OUT_OF_RANGE = "the laminate's constants are too large or too far apart to compute with"
 
