@@ -39,6 +39,7 @@ from fecm.problem.build import RunOptions
 from fecm.problem.deck_check import check_loaded
 from fecm.problem.loading import LoadedDeck, load_deck, sole
 from fecm.problem.problem import Problem
+from fecm.results.criteria import spelt
 
 
 def count_findings(findings: Sequence[Finding]) -> str:
@@ -183,7 +184,6 @@ def _print(prepared: LoadedDeck, form: Format, *, brief: bool, passes: bool) -> 
 def _compare_meshes(prepared: LoadedDeck, mode: str, form: Format) -> None:
     """Print the mesh error of the peak force of every problem."""
     # 28 ms, which a check without --mesh-error does not need.
-    from fecm.results.criteria import spelt
     from fecm.sweeps.mesh_error import bisected, compare_peaks
 
     for problem in prepared.problems:

@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypedDict
 
 import click
+import h5py
 import numpy as np
 
 from fecm._inputs import lines_of
+from fecm._machine import available_processors
 from fecm._table import aligned
 from fecm._text import printable, short_text
 from fecm._version import __version__
@@ -19,6 +21,7 @@ from fecm.cli.common import echo_json
 from fecm.cli.isolation import reads
 from fecm.cli.options import FORMAT_OPTION, NAMED_PATH, Format, typical
 from fecm.deck.units import declared_units
+from fecm.mechanics import kernels
 from fecm.results.hdf5_reader import FileContents, read
 from fecm.results.result import result_of
 from fecm.results.schema import Form
@@ -37,12 +40,7 @@ PERMANENT = "permanent_indentation"
 def _system(context: click.Context, _: object, asked: bool) -> None:
     if not asked:
         return
-    # 13 ms, which a description does not need.
-    import h5py
-    import scipy
-
-    from fecm._machine import available_processors
-    from fecm.mechanics import kernels
+    import scipy  # 10 ms, which a description does not need
 
     for name, text in (
         ("fecm", __version__),

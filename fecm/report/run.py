@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -375,8 +376,6 @@ def _criteria(result: Result) -> list[PageBlock]:
 
 def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> Iterator[PageBlock]:
     """Yield version, solver, checksums, and the decks."""
-    import hashlib
-
     texts = {name: result.deck_text for name, result in results.items()}
     rows: dict[str, list[Cell]] = {
         "fecm": [str(r.attributes.get("fecm_version", UNKNOWN)) for r in results.values()],

@@ -31,7 +31,7 @@ from fecm.results.criteria import criteria_of
 from fecm.results.exposures import LOWER_BOUNDS
 from fecm.results.groups import ExportError, NotStoredError, remedy, stored_by, suggestion
 from fecm.results.hdf5_writer import new_hdf5
-from fecm.results.plate_fields import Fields, Ints, Note, plate_fields, vtk_cells, vtk_points
+from fecm.results.plate_fields import At, Fields, Ints, Note, plate_fields, vtk_cells, vtk_points
 from fecm.results.plies import IN_PLANE, INTERLAMINAR, rows_at
 from fecm.results.schema import (
     AXIS_NAMES,
@@ -367,7 +367,6 @@ def pyvista_grid(stored: Stored, time: float | str | None) -> pyvista.Unstructur
         import pyvista  # optional
     except ImportError:
         raise ImportError("a grid needs PyVista: pip install 'fecm[pyvista]'") from None
-    from fecm.results.plate_fields import At, plate_fields  # 5 ms, which other uses of results save
 
     if "tape3/w" not in stored:
         raise NotStoredError("there are no displacements (tape3) in this result; add DISP")

@@ -22,7 +22,9 @@ from fecm.results.exposures import (
     FailureVerdict,
     LargestExposure,
     evaluations_in_contact,
+    failure_metrics,
     failure_verdict,
+    first_failures,
     largest_exposures,
 )
 from fecm.results.groups import GROUPS
@@ -346,8 +348,6 @@ def _first_failures(result: Stored) -> list[FirstFailure]:
     """Return the first time at which each criterion reaches 1; empty without FAIL."""
     if "exposures/exposure" not in result:
         return []
-    from fecm.results.exposures import first_failures  # 1 ms, for FAIL only
-
     return first_failures(result)
 
 
@@ -588,8 +588,6 @@ def _metrics(result: Stored) -> MetricsJson:
     """Return the impact metrics, and the metrics of FAIL under ``failure``."""
     if "failure/x" not in result:
         return cast("MetricsJson", metrics_of(result))
-    from fecm.results.exposures import failure_metrics  # 1 ms, for FAIL only
-
     metrics = {**metrics_of(result), "failure": failure_metrics(result)}
     return cast("MetricsJson", metrics)
 

@@ -27,6 +27,7 @@ from fecm.simulation.decision import history_attributes, symmetry_attributes, un
 from fecm.simulation.judge import judge_run
 from fecm.simulation.macros import STORING, bind, bind_loop
 from fecm.simulation.simulation import Observer, Simulation
+from fecm.simulation.state import cause_of_divergence
 
 
 def simulate(
@@ -66,8 +67,6 @@ def run_program(simulation: Simulation) -> Result:
                 simulation.recorder.failure(state.failure)
             simulation.recorder.finish()
     except DivergenceError as diverged:
-        from fecm.simulation.state import cause_of_divergence  # only then
-
         cause = cause_of_divergence(problem, simulation.model, state.dt, simulation.options.law)
         raise DivergenceError(diverged.step, f"{diverged.reason}; {cause}") from None
     return _write_footer(simulation)

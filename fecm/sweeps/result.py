@@ -24,7 +24,7 @@ from fecm.results.pictures import SweepKind, plot_results
 from fecm.results.written import Reported, Saved
 from fecm.sweeps import reduced as reduced_check
 from fecm.sweeps.case_tables import MEASURED
-from fecm.sweeps.files import FORCE, random_of
+from fecm.sweeps.files import FORCE, random_of, save_sweep, sweep_csv_lines
 from fecm.sweeps.outcome import About, Column, Outcome
 from fecm.sweeps.reduced import ReducedModel
 from fecm.sweeps.statistics import evaluate
@@ -101,8 +101,6 @@ class SweepResult(StoredSweep, Saved, Reported):
         return (*texts, *remarks(self), *(() if self.random is None else self.random.notes))
 
     def _write(self, path: Path, *, overwrite: bool) -> None:
-        from fecm.sweeps.files import save_sweep  # h5py takes 60 ms to import
-
         save_sweep(self, path, overwrite=overwrite)
 
     @property
@@ -224,8 +222,6 @@ class SweepResult(StoredSweep, Saved, Reported):
         >>> result = fecm.sweep(deck, {"velocity": [100.0, 115.0, 130.0]})
         >>> result.export("velocities.csv")
         """
-        from fecm.sweeps.files import sweep_csv_lines  # 2 ms at start
-
         lines = sweep_csv_lines(self, table, decimal)
         check_outputs([Path(path)], overwrite)
         with open_for_writing(Path(path), overwrite=overwrite) as file:
