@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 
 import fecm
 
-plate = fecm.Plate.rectangle((100, 100), (8, 8), support="simple")
+plate = fecm.Plate.rectangle((100, 100), (16, 16), support="simple", grading=4.0)
 faces = fecm.Laminate("[0/90/0/90/0]", "IM7/8552", 0.25)
 mass, contact = fecm.RigidMass(1e-4), fecm.Contact.estimate(radius=8)  # 0.1 kg; mm, N, s
 settings = {"velocity": 1000, "duration": "4ms", "every": 100, "patch": "disc:3"}

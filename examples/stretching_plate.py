@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 
 import fecm
 
-plate = fecm.Plate.rectangle((100, 100), (8, 8), support="clamped", grading=2.0)
+plate = fecm.Plate.rectangle((100, 100), (12, 12), support="clamped", grading=2.0)
 laminate = fecm.Laminate("[45/0/-45/90]2s", "IM7/8552", 0.131)
 mass, contact = fecm.RigidMass(1e-3), fecm.Contact.estimate(radius=8)  # 1 kg
 settings = {"duration": "4ms", "every": 100, "patch": "hertz:6", "units": "mm-N-s"}

@@ -219,7 +219,9 @@ def test_no_contact_is_estimated_on_a_fabric() -> None:
     assert "`fecm indent hertz --et E3`" in made.stderr
 
 
-def test_a_mesh_of_a_window_that_is_refined_to_a_patch_is_told() -> None:
-    window = ("--fixture", "D7136", *PLATE[:4], "--material", "IM7/8552", "--patch", "disc:2")
-    assert "20x14 elements instead of 8x6: their sides at" in new(*window, *QUICK).stderr
-    assert "elements instead of" not in new(*window, *QUICK[2:]).stderr
+def test_the_mesh_of_a_window_is_obeyed_whatever_the_radius_of_the_patch() -> None:
+    window = ("--fixture", "D7136", *PLATE[:4], "--material", "IM7/8552", *QUICK)
+    wide, narrow = (new(*window, "--patch", f"disc:{c}") for c in (20, 2))
+    (wide_mesh, narrow_mesh) = (fecm.read_one(made.stdout).control for made in (wide, narrow))
+    assert narrow_mesh.numel == wide_mesh.numel
+    assert "is larger than the radius of the patch, 2" in narrow.stderr

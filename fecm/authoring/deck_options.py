@@ -48,8 +48,8 @@ class DeckOptions:
     _: KW_ONLY
     patch: str | Patch | None = option(
         AUTO,
-        "Area of the contact force: disc or hertz, with :RADIUS, to which a rectangle's mesh is "
-        "then refined; or none, a point force.  D7136 takes hertz.",
+        "Area of the contact force: disc or hertz, with :RADIUS, which elements there should "
+        "not exceed; or none, a point force.  D7136 takes hertz.",
         python="None is a force on the nearest node.",
         default_text="disc",
         group="Numerics",

@@ -9,14 +9,13 @@ from typing import Literal, NamedTuple, Self
 
 from fecm.authoring.laminate import DeckPlies
 from fecm.authoring.parameters import ObjectError, is_finite, number_pair
-from fecm.authoring.plate import MOST, WINDOW_MESH, Plate
+from fecm.authoring.plate import MOST, Plate
 from fecm.deck import grid as grids
 from fecm.deck.grid import ElementGrid, GridSection, held_in_plane
 from fecm.deck.model import Boundary, Curvature, Patch
 from fecm.problem.plate_mesh import PlateMesh
 
 MOST_ELEMENTS = 500_000
-LEAST_RADIUS = 1e-3  # smallest radius to refine a mesh to, over the side of the plate
 
 InPlane = Literal["free", "held", "normal", "tangential"]  # u and v on supports
 FREE: InPlane = "free"
@@ -52,11 +51,10 @@ def place_impact(
 ) -> Placed:
     """Return the mesh, the impact node and the patch for an impact at a point.
 
-    If the point is moved to a node or the mesh is refined, `doubts` gets a text about it, which
-    calls the point `load`.
+    If the point is moved to a node, `doubts` gets a text about it, which calls the point `load`.
     """
     point = None if at is None else number_pair("at", at)
-    mesh = plate.imported or plate_grid(plate, point, None if patch is None else patch.radius)
+    mesh = plate.imported or plate_grid(plate, point)
     low, high = mesh.extent
     side = min(high[0] - low[0], high[1] - low[1])
     if plies.thickest >= side:
@@ -81,37 +79,11 @@ def place_impact(
                 f"the {load} is moved by {distance:.4g}: from {origin} at {x:g}, {y:g} to "
                 f"the nearest node, {node} at {node_x:g}, {node_y:g}"
             )
-    doubts += _doubts_of_refinement(plate, mesh, patch)
     return Placed(mesh, node, patch, (node_x, node_y))
 
 
-def _doubts_of_refinement(plate: Plate, mesh: AnyMesh, patch: Patch | None) -> list[str]:
-    """Return a doubt if refinement changes the numbers of elements of a rectangle or window.
-
-    The default mesh of a window is refined without a word.
-    """
-    if not isinstance(mesh, ElementGrid) or plate.mesh is None:
-        return []
-    if patch is None or patch.radius is None:
-        return []
-    beside = 1 if plate.fixture else 0  # sections of the frame at each end
-    counts = tuple(
-        sum(section.elements for section in sections[beside : len(sections) - beside])
-        for sections in (mesh.columns, mesh.rows)
-    )
-    if counts == plate.mesh or (plate.fixture and plate.mesh == WINDOW_MESH):
-        return []
-    refined, requested = (f"{nx}x{ny}" for nx, ny in (counts, plate.mesh))
-    return [
-        f"the mesh has {refined} elements instead of {requested}: their sides at the patch are at "
-        f"most its radius {patch.radius:g}"
-    ]
-
-
-def plate_grid(
-    plate: Plate, point: tuple[float, float] | None, radius: float | None
-) -> ElementGrid:
-    """Return the grid of a rectangular plate, refined to the radius of a patch.
+def plate_grid(plate: Plate, point: tuple[float, float] | None) -> ElementGrid:
+    """Return the grid of a rectangular plate, graded towards a point; None is the centre.
 
     On a fixture, `plate.size` and `plate.mesh` describe the window.
     """
@@ -120,7 +92,7 @@ def plate_grid(
         whole = plate.fixture.size if plate.fixture else plate.size
         centre = point or (whole[0] / 2.0, whole[1] / 2.0)
         columns, rows = (
-            _sections(side, count, x - (length - side) / 2.0, plate.grading, radius)
+            _sections(side, count, x - (length - side) / 2.0, plate.grading)
             for side, count, x, length in zip(plate.size, plate.mesh, centre, whole, strict=True)
         )
         if plate.fixture:
@@ -134,22 +106,11 @@ def plate_grid(
     return grid
 
 
-def _sections(
-    length: float, count: int, centre: float, grading: float, radius: float | None
-) -> list[GridSection]:
-    """Return the sections in one direction, refined so that elements at `centre` fit `radius`."""
+def _sections(length: float, count: int, centre: float, grading: float) -> list[GridSection]:
+    """Return the sections in one direction, with the smallest elements at `centre`."""
     if grading > 1.0:
-        sections = grids.graded(length, count, centre, grading)
-    else:
-        sections = grids.uniform_section(length, count)
-    if radius is None or grids.longest_at(sections, centre) <= radius:
-        return sections
-    if radius < LEAST_RADIUS * length:
-        raise ObjectError(
-            f"the mesh is not refined to a radius of {radius:g}, less than {LEAST_RADIUS:g} times "
-            f"the plate's side of {length:g}; give `columns` and `rows`"
-        )
-    return grids.refined_sections(length, count, centre, grading, radius)
+        return grids.graded(length, count, centre, grading)
+    return grids.uniform_section(length, count)
 
 
 class Supported(NamedTuple):

@@ -151,7 +151,10 @@ def unresolved_patch(problem: Problem) -> Reports:
         f"The side of the element at the patch, {side:.4g}, is larger than {limit}: strains and "
         "stresses near the patch depend on the mesh, and the peak force is too high."
     )
-    hint = "refine the mesh at the patch; fecm check --mesh-error shows the effect on the peak"
+    hint = (
+        "refine the mesh at the patch, with more elements or fecm new --grading; fecm check "
+        "--mesh-error shows the effect on the peak"
+    )
     yield Report(message, card.place("radius c"), hint)
 
 
