@@ -99,7 +99,7 @@ def _notes_of_places(checked: Problem, cases: Sequence[Case]) -> Iterator[str]:
 
 def _notes_of_symmetry(checked: Problem, cases: Sequence[Case]) -> Iterator[str]:
     """Name the impact points beside the lines of symmetry of the deck's part of a plate."""
-    if not cases[0].keys().isdisjoint(OTHER_PLATE):
+    if not checked.symmetry.lines or not cases[0].keys().isdisjoint(OTHER_PLATE):
         return
     places = [place for case in cases if (place := _place_of(checked, case)) is not None]
     near = SAME_LINE * checked.longer_side

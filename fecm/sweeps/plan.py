@@ -93,7 +93,7 @@ def plan(
     )
     if law is not None and build is None:
         check_law(law, cases[0])
-    method = method_of(checked, settings, cases[0])
+    method = method_of(checked, settings, cases[0].keys())
     definition = Plan(settings, tuple(cases), method, design, tuple(limits), measured)
     if refusal := method.refusal(checked, definition):
         raise CasesError(refusal)
