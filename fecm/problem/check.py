@@ -126,6 +126,8 @@ def _check_materials(deck: model.Deck, findings: Findings) -> None:
     """Check that materials and laminates of all segments exist."""
     before = findings.error_count
     apply(zones.OF_DECK, findings, deck)
+    if (zone := deck.last(model.Zones)) is not None:
+        apply(zones.OF_ZONES, findings, deck, zone)
     if (strengths := deck.last(model.Allowables)) is not None:
         apply(damage.OF_MATERIALS, findings, deck, strengths)
     if (card := deck.last(model.Cure)) is not None and findings.error_count == before:

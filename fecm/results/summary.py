@@ -209,10 +209,8 @@ def _run_rows(result: Stored) -> list[Row]:
         lines.append(("delamination", f"{_delamination(result)}{_delaminations(result)}"))
         if math.isfinite(float(result.threshold["time"])):
             lines.append(_search("the threshold", "peak_force=threshold"))
-    lines += _exposures(result)
-    if "failure/x" in result and (count := np.count_nonzero(result["failure/under_load"])):
-        count *= result.symmetry_factor
-        lines.append(("left out", f"{count} points under the load or at corners of supports"))
+    if "failure/x" in result:
+        lines += _exposures(result)
     if "modes/angular_frequency" in result:
         frequencies = result["modes/angular_frequency"]
         texts = ", ".join(significant(omega) for omega in frequencies[:LISTED])
@@ -341,6 +339,8 @@ def _exposures(result: Stored) -> list[Row]:
         ends = " by the end of the run, which is in contact: open"
         ends = ends if result.still_in_contact else ""
         lines.append(("first failure", f"{is_open}none{ends}"))
+    if left_out := np.count_nonzero(result["failure/under_load"]) * result.symmetry_factor:
+        lines.append(("left out", f"{left_out} points under the load or at corners of supports"))
     return lines
 
 

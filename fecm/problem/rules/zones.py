@@ -83,14 +83,14 @@ def missing_material(deck: model.Deck) -> Reports:
 
 
 @rule("E498", Subject.LAMINATE)
-def invalid_zone(deck: model.Deck) -> Reports:
+def invalid_zone(deck: model.Deck, card: model.Zones) -> Reports:
     """A zone has an element or a laminate that the deck does not have.
 
     Remedy: Elements up to NUMEL; laminate 1 is MATE's, the others are on LAMS.
     """
-    card, count = deck.last(model.Zones), deck.control.numel
+    count = deck.control.numel
     laminate_numbers = {MATERIAL, *(laminate.number for laminate in _laminates(deck))}
-    for zone in () if card is None else card.records:
+    for zone in card.records:
         last = zone.last or zone.first
         for number, name in ((zone.first, "first element"), (last, "last element")):
             if not 1 <= number <= count:
@@ -180,5 +180,6 @@ def soft_core(problem: Problem) -> Reports:
             yield Report(message, shear.place() or _place(deck, number), "use SHEA EQUI")
 
 
-OF_DECK = (number_taken, missing_material, invalid_zone)
+OF_DECK = (number_taken, missing_material)
+OF_ZONES = (invalid_zone,)
 VALUES = (unused, coupled_inertia, soft_core)
