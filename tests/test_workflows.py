@@ -90,9 +90,12 @@ def test_citation_and_package_have_the_same_authors() -> None:
     assert loaded("CITATION.cff")["authors"] == PROJECT["authors"]
 
 
-@pytest.mark.parametrize(("commits", "expected"), [(1, "9.8.7"), (2, "9.8.8.dev1")])
-def test_an_archive_of_a_tag_without_a_repository_has_its_version(
-    commits: int, expected: str, tmp_path: Path
+@pytest.mark.parametrize(
+    ("tag", "commits", "expected"),
+    [("v9.8.7", 1, "9.8.7"), ("v9.8.7", 2, "9.8.8.dev1"), ("another", 1, "3.2.1")],
+)
+def test_an_archive_without_a_repository_has_the_version_of_its_tag_or_the_fallback(
+    tag: str, commits: int, expected: str, tmp_path: Path
 ) -> None:
     setuptools_scm = pytest.importorskip("setuptools_scm")
     if shutil.which("git") is None:
@@ -110,10 +113,10 @@ def test_an_archive_of_a_tag_without_a_repository_has_its_version(
     git("init", "-q")
     git("add", ".")
     git("commit", "-qm", "first")
-    git("tag", "v9.8.7")
+    git("tag", tag)
     for _ in range(commits - 1):
         git("commit", "-qm", "next", "--allow-empty")
     with tarfile.open(fileobj=io.BytesIO(git("archive", "HEAD"))) as archive:
         archive.extractall(copy, filter="data")
-    (version, _, _) = setuptools_scm.get_version(copy).partition("+")
+    (version, _, _) = setuptools_scm.get_version(copy, fallback_version="3.2.1").partition("+")
     assert version == expected
