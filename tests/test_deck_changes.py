@@ -216,7 +216,81 @@ def test_the_unit_of_a_quantity_is_never_dropped_where_float_would_drop_it() -> 
     class Quantity(float):  # as unyt's: a number with `value` and `units`
         value, units = 3.0, "m/s"
 
+    class Length(float):
+        value, units = 12.0, "cm"
+
     assert DECK.with_(velocity=Quantity(3.0)).require(Impact).velocity == 3000.0
+    plate = fecm.Plate.rectangle((Length(12.0), 80), (6, 4))
+    assert DECK.with_(plate=plate) == DECK.with_(plate=fecm.Plate.rectangle((120, 80), (6, 4)))
+
+
+UNNAMED = fecm.impact(
+    PLATE, fecm.Laminate("[0/90]2s", CONSTANTS, 0.25), MASS, FIRM, **QUICK | {"units": None}
+)
+
+
+def impact_on(size: Any, **options: Any) -> fecm.Deck:
+    projectile, contact = options.pop("projectile", MASS), options.pop("contact", FIRM)
+    plate = fecm.Plate.rectangle(size, (6, 4))
+    return fecm.impact(plate, PLIES, projectile, contact, **QUICK | options)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "numbers"),
+    [
+        ({"size": ("10 cm", 80)}, {}),
+        ({"at": ("4cm", "40 mm")}, {"at": (40, 40)}),
+        ({"gages": [("1cm", 20, "-1 mm", 45)]}, {"gages": [(10, 20, -1, 45)]}),
+        ({"zones": [((0, "0", "5cm", 80), "[0]4")]}, {"zones": [((0, 0, 50, 80), "[0]4")]}),
+        ({"patch": "hertz:0.8 cm"}, {"patch": "hertz:8"}),
+        ({"projectile": "50 g"}, {"projectile": fecm.RigidMass(5e-5)}),
+        ({"contact": fecm.Contact.estimate("0.8cm", "207GPa", 0.3)},
+         {"contact": fecm.Contact.estimate(8, 207e3, 0.3)}),
+    ],
+)  # fmt: skip
+def test_parts_with_units_give_the_deck_of_their_numbers(
+    lengths: dict[str, Any], numbers: dict[str, Any]
+) -> None:
+    assert impact_on(**{"size": (100, 80)} | lengths) == impact_on((100, 80), **numbers)
+
+
+def test_parts_with_units_are_converted_to_the_units_of_each_deck() -> None:
+    plate = fecm.Plate.rectangle(("4in", "2in"), (4, 2))
+    tip = fecm.Contact.estimate("0.5in", "70GPa", 0.3)
+    # 1 lbf s^2/in is 175.126835 kg.
+    for units, inch, mass in (("mm-N-s", 25.4, 5.5e-3), ("in-lbf-s", 1.0, 5.5 / 175.126835)):
+        deck = fecm.impact(
+            plate, fecm.Laminate("[0/90]2s", "AS4/8552"), "5.5kg", tip, energy="1J",
+            duration="10us", units=units, at=("1in", "1in"),
+        )  # fmt: skip
+        sides = np.ptp(generate(deck).coordinates, axis=0)
+        assert sides == pytest.approx([4 * inch, 2 * inch])
+        assert deck.require(Projectile).size == pytest.approx(mass)
+        moved = deck.with_(at=("2in", "1in"))
+        assert moved == deck.with_(at=(2 * inch, inch)) != deck
+        assert deck.with_(size=("8in", "2in")) == deck.with_(size=(8 * inch, 2 * inch))
+        assert deck.with_(projectile="11 kg") == deck.with_(mass="11 kg")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: impact_on(("1kg", 80)), "`size` is '1kg', not a number or one with a unit, as in"),
+        (lambda: impact_on("64"), "`size` is '64', not 2 numbers"),
+        (lambda: impact_on(("-1mm", 80)), "`size` is -1.0; it must be a positive number"),
+        (lambda: fecm.Contact.estimate("8kg"), "`radius` is '8kg', not a number or one"),
+        (lambda: impact_on((100, 80), projectile="5mm"), "`projectile` is '5mm', not a number or"),
+        (lambda: impact_on((100, 80), projectile="-5kg"), "`projectile` is -0.005; it must be"),
+        (lambda: impact_on((100, 80), at=(40,)), "`at` is .*, not 2 numbers"),
+        (lambda: impact_on((100, 80), patch="disc:8kg"), "`patch` is '8kg', not a number or one"),
+        (lambda: impact_on((100, 80), gages=[(1, 2)]), "`gages` are not x, y, z and degrees"),
+        (lambda: UNNAMED.with_(at=("5mm", 1)), "at: `5mm` has a unit, but the deck names no units"),
+        (lambda: UNNAMED.with_(projectile="5kg"), "`projectile` is '5kg': give the deck's `units`"),
+    ],
+)  # fmt: skip
+def test_a_part_with_a_wrong_unit_is_refused(make: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()
 
 
 @pytest.mark.parametrize(

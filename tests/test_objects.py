@@ -489,7 +489,7 @@ PLATE = fecm.Plate.rectangle(SIDES, (4, 4))
         ({"duration": -1.0}, "`duration` is -1.0; it must be a positive number"),
         ({"units": "cubits"}, "`units`: 'cubits' is not a system of units"),
         ({"units": ["mm", "N", "s"]}, "`units` is .*, not a text such as 'mm-N-s'"),
-        ({"patch": "square"}, "'square' is not none, disc, hertz"),
+        ({"patch": "square"}, "`patch` is 'square', not none, disc, hertz"),
         ({"shear": "reduced"}, "`shear` is 'reduced'"),
         ({"at": (500.0, 0.0)}, "`at` is outside the plate: 500, 0, where it has x 0 to 100 and"),
         ({"damage": True}, "`damage` needs a named ply"),

@@ -40,22 +40,19 @@ def number_of_text(name: str, text: str) -> float:
     raise CasesError(f"{name} must be a finite number, not `{text.strip()}`")
 
 
-def pair_of_text(name: str, text: str) -> tuple[float, float]:
-    """Parse a text of two numbers, such as ``(3,2)`` or ``6x4``.
-
-    Raises CasesError if the text does not have two numbers.
-    """
+def parts_of_pair(name: str, text: str) -> list[str]:
+    """Return the two parts of a text such as ``(3,2)`` or ``6x4``; raise CasesError otherwise."""
     form, separators = PAIRS[name]
     parts = re.split(separators, text.strip().removeprefix("(").removesuffix(")").strip())
     if len(parts) != 2:
         raise CasesError(f"{name} must be two numbers as in {form.format(6, 4)}, not `{text}`")
-    return number_of_text(name, parts[0]), number_of_text(name, parts[1])
+    return parts
 
 
-def normal_pair(name: str, text: str) -> str:
-    """Return a text of two numbers in its usual form."""
-    form, _ = PAIRS[name]
-    return form.format(*(repr(value).removesuffix(".0") for value in pair_of_text(name, text)))
+def pair_of_text(name: str, text: str) -> tuple[float, float]:
+    """Parse a text of two numbers; raise CasesError if it does not have them."""
+    first, second = parts_of_pair(name, text)
+    return number_of_text(name, first), number_of_text(name, second)
 
 
 def check_count(count: int, cases: str = "") -> None:

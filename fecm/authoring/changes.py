@@ -21,7 +21,7 @@ from fecm.authoring.laminate import (
     toughness_of,
 )
 from fecm.authoring.mesh import MembraneSupport, place_impact, support_plate
-from fecm.authoring.parameters import ObjectError, check_kind, in_units
+from fecm.authoring.parameters import ObjectError, check_kind, in_units, projectile_in_units
 from fecm.authoring.plate import Plate, Support
 from fecm.authoring.plate_values import swapped
 from fecm.authoring.strike_values import strike_of, struck_layers
@@ -53,7 +53,7 @@ class Parts(NamedTuple):
         if self.laminate is not None:
             check_kind("laminate", self.laminate, Laminate)
         if self.projectile is not None:
-            check_kind("projectile", self.projectile, AnyProjectile)
+            check_kind("projectile", text_of(self.projectile), AnyProjectile)
         if self.contact is not None:
             check_kind("contact", self.contact, AnyContact)
 
@@ -90,7 +90,7 @@ class Values(TypedDict, total=False):
     rod_length: Number
     rod_modulus: Number
     rod_density: Number
-    at: str | Iterable[float]
+    at: str | Iterable[float | str]
     impact_node: int | str
     patch: Number
     x0: Number
@@ -122,7 +122,7 @@ class Values(TypedDict, total=False):
     s13: Number
     s23: Number
     cure_dT: Number
-    size: str | Iterable[float]
+    size: str | Iterable[float | str]
     support: Support
     dt: Number
     duration: Number
@@ -140,7 +140,8 @@ def with_values(deck: Deck, values: Mapping[str, Any]) -> Deck:
     parts = {name: value for name, value in values.items() if name in Parts._fields}
     not_values = (*Parts._fields, NONLINEAR)
     numbers = _in_deck_units(deck, {n: value for n, value in values.items() if n not in not_values})
-    case = {name: value_of(name, value, "with_") for name, value in numbers.items()}
+    system = system_of(deck)
+    case = {name: value_of(name, value, "with_", system) for name, value in numbers.items()}
     new_parts = Parts(**parts)
     new_parts.check()
     try:
@@ -201,7 +202,8 @@ def with_projectile(deck: model.Deck, projectile: AnyProjectile) -> model.Deck:
     """Return the deck with another projectile; a rod keeps the node of the transducer."""
     if isinstance(projectile, model.Projectile):
         return swapped(deck, deck.last(model.Projectile), projectile)
-    return strike_of(deck).with_projectile(projectile).deck()
+    rigid_or_rod = projectile_in_units(projectile, system_of(deck))
+    return strike_of(deck).with_projectile(rigid_or_rod).deck()
 
 
 def with_contact(deck: model.Deck, contact: AnyContact) -> model.Deck:

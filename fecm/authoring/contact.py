@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fecm.authoring.laminate import DeckPlies
-from fecm.authoring.parameters import ObjectError, check_numbers, check_positive
+from fecm.authoring.parameters import ObjectError, check_numbers, check_positive, in_units
 from fecm.authoring.plate import DropWeight
 from fecm.deck.catalogue import (
     CONTACTS,
@@ -39,9 +39,9 @@ PATCHES = {"disc": DISC, "hertz": HERTZ}
 class Sphere:
     """Elastic contact of a sphere; k is estimated from the constants of the plies."""
 
-    radius: float | None = None  # length; None for the radius of a standard
+    radius: float | str | None = None  # length; None for the radius of a standard
     # Elastic constants; None for steel.
-    modulus: float | None = None
+    modulus: float | str | None = None
     poisson: float | None = None
 
     def __repr__(self) -> str:
@@ -49,16 +49,24 @@ class Sphere:
         shown = ", ".join(f"{name}={value!r}" for name, value in values if value is not None)
         return f"Contact.estimate({shown})"
 
+    def radius_in(self, system: str | None) -> float | None:
+        """Return the radius in a system of units; raise ObjectError if its unit needs a system."""
+        return in_units("radius", self.radius, "length", system)
+
+    def modulus_in(self, system: str | None) -> float | None:
+        """Return the modulus in a system of units; raise ObjectError if its unit needs a system."""
+        return in_units("modulus", self.modulus, MODULUS, system)
+
     def law(self, plies: DeckPlies, layers: Sequence[Layer]) -> tuple[Indentation, str]:
         """Return the contact law on layers, and comment lines that explain the estimate of k."""
-        if self.radius is None:
+        radius, modulus = self.radius_in(plies.system), self.modulus_in(plies.system)
+        if radius is None:
             raise ObjectError("the `contact` estimate needs the sphere's radius")
-        if self.modulus is None and plies.system is None:
+        if modulus is None and plies.system is None:
             raise ObjectError(
                 "the `contact` estimate with constants of a `ply` needs `units`, or the sphere's "
                 "elastic constants"
             )
-        modulus = self.modulus
         if modulus is None:
             modulus = convert(STEEL_MODULUS, MODULUS, STANDARD, plies.system or STANDARD)
         poisson = STEEL_POISSON if self.poisson is None else self.poisson
@@ -71,13 +79,13 @@ class Sphere:
                 [material.nu23 for material in materials],
             )
             effective = indentation_modulus(stiffness)
-            k = float(f"{hertz_coefficient(self.radius, modulus, poisson, effective):.6g}")
+            k = float(f"{hertz_coefficient(radius, modulus, poisson, effective):.6g}")
         except (ValueError, ArithmeticError) as error:
             raise ObjectError(f"k cannot be estimated: {error}; give a law") from None
         ratios = " and ".join(dict.fromkeys(f"{material.nu23:g}" for material in materials))
         return Indentation(k, 0.0, 0.0, ELASTIC_POWER), (
             "! k of EXPE is estimated by the laminate's indentation modulus "
-            f"{effective:.5g}: a sphere of radius {self.radius:g},\n"
+            f"{effective:.5g}: a sphere of radius {radius:g},\n"
             f"! E {modulus:g} and nu {poisson:g}; nu23 of the ply {ratios}.  "
             "A measured k may be larger; the law is elastic.\n"
         )
@@ -87,7 +95,8 @@ def doubts_of_sphere(sphere: Sphere, system: str | None, test: DropWeight | None
     """Return doubts about a modulus in another unit, and a diameter instead of the radius."""
     doubts: list[str] = []
     names = units_of(system) if system else {}
-    size, modulus = in_si(MODULUS, names), sphere.modulus
+    size, modulus = in_si(MODULUS, names), sphere.modulus_in(system)
+    radius = sphere.radius_in(system)
     if modulus is not None and size is not None and not SOFTEST <= modulus * size <= HARDEST:
         unit = likely_unit(modulus, MODULUS, STEEL_IN_SI)
         least, greatest = SOLID
@@ -96,25 +105,26 @@ def doubts_of_sphere(sphere: Sphere, system: str | None, test: DropWeight | None
                 f"the sphere's modulus {modulus:g} in the `contact` estimate looks like {unit}; "
                 f"{needed_unit(MODULUS, names)}"
             )
-    if test is not None and sphere.radius == 2.0 * test.radius:
+    if test is not None and radius == 2.0 * test.radius:
         doubts.append(
-            f"the `contact` estimate takes the sphere's radius; {sphere.radius:g} is the diameter "
+            f"the `contact` estimate takes the sphere's radius; {radius:g} is the diameter "
             f"of the standard's indenter, whose radius is {test.radius:g}"
         )
     return doubts
 
 
 def doubts_of_soft_tip(
-    sphere: Sphere, radius: float, k: float, energy: float, modulus: float
+    sphere: Sphere, system: str | None, radius: float, k: float, energy: float, modulus: float
 ) -> list[str]:
     """Return a doubt about the patch if the sphere is far softer than the plies.
 
     The contact circle has the radius (R alpha)^(1/2). The indentation alpha is largest if the plate
     is rigid. It then follows from the energy (2/5) k alpha^(5/2).
     """
-    if sphere.radius is None or sphere.modulus is None or sphere.modulus > SOFT_TIP * modulus:
+    tip, softness = sphere.radius_in(system), sphere.modulus_in(system)
+    if tip is None or softness is None or softness > SOFT_TIP * modulus:
         return []
-    circle = math.sqrt(sphere.radius * (2.5 * energy / k) ** 0.4)
+    circle = math.sqrt(tip * (2.5 * energy / k) ** 0.4)
     if circle < 2.0 * radius:
         return []
     return [
@@ -172,16 +182,21 @@ class Contact(Indentation):
 
     @staticmethod
     def estimate(
-        radius: float | None = None, modulus: float | None = None, poisson: float | None = None
+        radius: float | str | None = None,
+        modulus: float | str | None = None,
+        poisson: float | None = None,
     ) -> Sphere:
         """Return the elastic law of a sphere on the laminate, as `fecm indent estimate` does.
 
         Parameters
         ----------
-        radius : float, optional
-            Length; by default the radius that the standard of a fixture prescribes.
-        modulus, poisson : float, optional
-            Elastic constants of the sphere; by default steel.
+        radius : float or str, optional
+            Length, in the deck's units or with a unit, as in ``"8mm"``; by default the radius that
+            the standard of a fixture prescribes.
+        modulus : float or str, optional
+            Young's modulus of the sphere, also with a unit, as in ``"207GPa"``; by default steel.
+        poisson : float, optional
+            Poisson's ratio of the sphere; by default steel.
 
         Examples
         --------
@@ -189,26 +204,29 @@ class Contact(Indentation):
         >>> fecm.Contact.estimate(radius=8)
         Contact.estimate(radius=8)
         """
-        check_positive(radius=radius, modulus=modulus)
         check_numbers(poisson=poisson)
-        return Sphere(radius, modulus, poisson)
+        sphere = Sphere(radius, modulus, poisson)
+        # In any system: the texts are checked.
+        check_positive(radius=sphere.radius_in(STANDARD), modulus=sphere.modulus_in(STANDARD))
+        return sphere
 
 
-def parse_patch(text: str) -> Patch | None:
+def parse_patch(text: str, system: str | None) -> Patch | None:
     """Parse a contact patch ``disc``, ``hertz``, ``disc:RADIUS`` or ``hertz:RADIUS``.
 
-    Returns None for ``none``, a point force. Raises ValueError for any other text.
+    Returns None for ``none``, a point force. A radius with a unit is converted to a system of
+    units. Raises ObjectError for any other text, or if the unit needs a system.
     """
     shape, colon, radius_text = text.partition(":")
     if text == "none":
         return None
-    try:
-        radius = float(radius_text) if colon else None
-        check_positive(radius=radius)
-        return Patch(PATCHES[shape], radius)
-    except (KeyError, ValueError):
-        message = f"{text!r} is not none, disc, hertz, disc:RADIUS or hertz:RADIUS"
-        raise ObjectError(message) from None
+    if shape not in PATCHES:
+        raise ObjectError(
+            f"`patch` is {text!r}, not none, disc, hertz, disc:RADIUS or hertz:RADIUS"
+        )
+    radius = in_units("patch", radius_text, "length", system) if colon else None
+    check_positive(patch=radius)
+    return Patch(PATCHES[shape], radius)
 
 
 AnyContact = Indentation | NamedContact | Sphere | str

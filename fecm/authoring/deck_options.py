@@ -21,6 +21,7 @@ from fecm.authoring.plate import DropWeight, Plate
 from fecm.deck.catalogue import NamedContact
 from fecm.deck.grid import IN_PLANE
 from fecm.deck.model import Indentation, Patch, Projectile
+from fecm.deck.quantities import text_of
 from fecm.mechanics.projectile import DeckProjectile, RigidMass, Rod
 from fecm.results.validity import LIMITS
 from fecm.results.validity import InPlane as MembraneEdges
@@ -36,7 +37,7 @@ LINEAR: Literal["linear"] = "linear"
 VON_KARMAN: Literal["von-karman"] = "von-karman"
 LIMIT = LIMITS[MembraneEdges.UNKNOWN]  # largest deflection over thickness of a linear plate, auto
 
-AnyProjectile = DeckProjectile | Projectile
+AnyProjectile = DeckProjectile | Projectile | str
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,8 @@ class DeckOptions:
     _: KW_ONLY
     patch: str | Patch | None = option(
         AUTO,
-        "Area of the contact force: disc or hertz, with :RADIUS, which elements there should "
-        "not exceed; or none, a point force.  D7136 takes hertz.",
+        "Area of the contact force: disc or hertz, with :RADIUS[UNIT], which elements there "
+        "should not exceed; or none, a point force.  D7136 takes hertz.",
         python="None is a force on the nearest node.",
         default_text="disc",
         group="Numerics",
@@ -101,7 +102,7 @@ class DeckOptions:
         python="As N0x, N0y and perhaps N0xy.",
         group="Plate",
     )
-    gages: Iterable[tuple[float, float, float, float]] = option(
+    gages: Iterable[tuple[float | str, float | str, float | str, float]] = option(
         (),
         "Strain gages: x, y and z (length, z from the mid-plane) and direction (degrees) of each.",
     )
@@ -119,7 +120,7 @@ class DeckOptions:
         default_text="plate, layup, ply, and energy of an impact",
         group="Other options",
     )
-    zones: Sequence[tuple[str | Sequence[float], Layup | Laminate]] = option(
+    zones: Sequence[tuple[str | Sequence[float | str], Layup | Laminate]] = option(
         (),
         "Layup, from the same materials, of elements whose centres lie in a rectangle, or of a "
         "group of surfaces of the mesh, as in PATCH:[0/90]4s.  A later zone overrides an earlier "
@@ -161,9 +162,9 @@ class ImpactOptions(DeckOptions):
     {parameters}
     """
 
-    projectile: Rod | RigidMass | Projectile | None = option(
+    projectile: Rod | RigidMass | Projectile | str | None = option(
         None,
-        "Projectile in the units of the deck.",
+        "Projectile in the units of the deck, or a rigid mass with its unit, as in 5.5kg.",
         default_text="the mass that the standard of a fixture prescribes; in lbf, in and s the "
         "report's rod",
         group="Impact",
@@ -187,7 +188,7 @@ class ImpactOptions(DeckOptions):
         group="Impact",
         metavar="E[UNIT]",
     )
-    at: tuple[float, float] | None = option(
+    at: tuple[float | str, float | str] | None = option(
         None,
         "Impact point.",
         python="The projectile hits the nearest node.  On an imported mesh the patch is centred at "
@@ -264,7 +265,7 @@ class ImpactOptions(DeckOptions):
         """Raise ObjectError if a value is not an object of fecm, or a text is invalid."""
         super().check()
         if self.projectile is not None:
-            check_kind("projectile", self.projectile, AnyProjectile)
+            check_kind("projectile", text_of(self.projectile), AnyProjectile)
         if self.contact is not None:
             check_kind("contact", self.contact, AnyContact)
         check_choice("kinematics", self.kinematics, (None, *get_args(Kinematics)))
@@ -304,7 +305,7 @@ class PlateDeckOptions(DeckOptions):
         None,
         "Static transverse force, positive along w, also with a unit, as in 1kN.  PROP scales it.",
     )
-    at: tuple[float, float] | None = option(
+    at: tuple[float | str, float | str] | None = option(
         None, "Place of the force.", default_text="the plate's centre"
     )
     kinematics: Literal["linear", "von-karman"] = option(

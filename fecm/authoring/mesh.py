@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from enum import Enum, auto
 from typing import Literal, NamedTuple, Self
 
 from fecm.authoring.laminate import DeckPlies
-from fecm.authoring.parameters import ObjectError, is_finite, number_pair
+from fecm.authoring.parameters import ObjectError, is_finite, lengths_in_units
 from fecm.authoring.plate import MOST, Plate
 from fecm.deck import grid as grids
 from fecm.deck.grid import ElementGrid, GridSection, held_in_plane
@@ -44,7 +45,7 @@ class Placed(NamedTuple):
 def place_impact(
     plate: Plate,
     plies: DeckPlies,
-    at: tuple[float, float] | None,
+    at: tuple[float | str, float | str] | None,
     patch: Patch | None,
     doubts: list[str],
     load: str = "impact point",
@@ -53,8 +54,8 @@ def place_impact(
 
     If the point is moved to a node, `doubts` gets a text about it, which calls the point `load`.
     """
-    point = None if at is None else number_pair("at", at)
-    mesh = plate.imported or plate_grid(plate, point)
+    point = None if at is None else lengths_in_units("at", at, 2, plies.system)
+    mesh = plate.imported or plate_grid(plate, plies.system, point)
     low, high = mesh.extent
     side = min(high[0] - low[0], high[1] - low[1])
     if plies.thickest >= side:
@@ -82,18 +83,21 @@ def place_impact(
     return Placed(mesh, node, patch, (node_x, node_y))
 
 
-def plate_grid(plate: Plate, point: tuple[float, float] | None) -> ElementGrid:
-    """Return the grid of a rectangular plate, graded towards a point; None is the centre.
+def plate_grid(plate: Plate, system: str | None, point: Sequence[float] | None) -> ElementGrid:
+    """Return the grid of a rectangular plate in a system of units, graded towards a point.
+
+    The point is the centre if it is None.
 
     On a fixture, `plate.size` and `plate.mesh` describe the window.
     """
     columns, rows = list(plate.columns), list(plate.rows)
-    if plate.size and plate.mesh:
-        whole = plate.fixture.size if plate.fixture else plate.size
+    sides = plate.sides(system)
+    if sides and plate.mesh:
+        whole = plate.fixture.size if plate.fixture else sides
         centre = point or (whole[0] / 2.0, whole[1] / 2.0)
         columns, rows = (
             _sections(side, count, x - (length - side) / 2.0, plate.grading)
-            for side, count, x, length in zip(plate.size, plate.mesh, centre, whole, strict=True)
+            for side, count, x, length in zip(sides, plate.mesh, centre, whole, strict=True)
         )
         if plate.fixture:
             columns, rows = grids.framed(columns, whole[0]), grids.framed(rows, whole[1])

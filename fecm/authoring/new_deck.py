@@ -59,7 +59,14 @@ from fecm.authoring.numerics import (
     with_impact_program,
     with_kinematics,
 )
-from fecm.authoring.parameters import ObjectError, check_positive, in_units, is_finite
+from fecm.authoring.parameters import (
+    ObjectError,
+    check_positive,
+    in_units,
+    is_finite,
+    lengths_in_units,
+    projectile_in_units,
+)
 from fecm.authoring.plate import DropWeight, Plate
 from fecm.authoring.zones import ElementLaminates, laminates_of, placed_zones
 from fecm.deck import model
@@ -80,16 +87,16 @@ LONGEST_LAYUP = 60  # characters; a title has the number of plies instead of a l
 def title_of(plate: Plate, laminate: Laminate, plies: DeckPlies) -> str:
     """Return a title such as ``D7136 [45/0/-45/90]3s IM7/8552``."""
     names = dict.fromkeys(named.name for _, named in plies.named)
-    words = (_plate_name(plate), _layup_name(laminate), " + ".join(names))
+    words = (_plate_name(plate, plies.system), _layup_name(laminate), " + ".join(names))
     return " ".join(filter(None, words))
 
 
-def _plate_name(plate: Plate) -> str:
+def _plate_name(plate: Plate, system: str | None) -> str:
     if plate.fixture is not None:
         return plate.fixture.name
-    if plate.size is None:
+    if (sides := plate.sides(system)) is None:
         return "plate"
-    x, y = plate.size
+    x, y = sides
     return f"plate {x:g}x{y:g}"
 
 
@@ -227,11 +234,13 @@ def plate_deck(options: PlateDeckOptions) -> model.Deck:
     force = in_units("force", options.force, "force", plies.system)
     if force is not None and not is_finite(force):
         raise ObjectError(f"`force` is {options.force!r}; it must be a finite number")
-    patch = None if force is None else contact_patch(options)
+    patch = None if force is None else contact_patch(options, plies.system)
     doubts_of_place = [] if force is None else doubts
     placed = place_impact(options.plate, plies, options.at, patch, doubts_of_place, "force")
     load = None if force is None else _static_load(placed, force)
-    laminates_of_elements = placed_zones(zones, in_zones, placed.mesh, placed.node, doubts)
+    laminates_of_elements = placed_zones(
+        zones, in_zones, placed.mesh, placed.node, doubts, plies.system
+    )
     strengths = [strengths_of(plies)] if options.failure else []
     plain = assemble(options, plies, placed.mesh, laminates_of_elements, [load], strengths)
     title = options.title
@@ -291,13 +300,13 @@ def author(options: ImpactOptions) -> Authored:
         notes.append(
             "nothing supports the plate (`support` is free): it flies away with the projectile"
         )
-    patch = contact_patch(options)
+    patch = contact_patch(options, plies.system)
     _check_complete(options, motion, plies.system)
     if motion.duration is None:  # with far too thin plies, the estimate of the duration takes long
         check_thickness(plies)
 
     mesh, node, patch, _ = place_impact(options.plate, plies, options.at, patch, doubts)
-    placed = placed_zones(zones, in_zones, mesh, node, doubts)
+    placed = placed_zones(zones, in_zones, mesh, node, doubts, plies.system)
     struck = plies.layups[placed.struck - MATERIAL]
     law, comment = indentation_law(options.contact, plies, struck)
     if comment:
@@ -318,7 +327,7 @@ def author(options: ImpactOptions) -> Authored:
     if options.failure and not any(isinstance(s, model.Allowables) for s in damage):
         damage = [strengths_of(plies), *damage]
     hit = model.Impact(node, 3, 1.0 if motion.velocity is None else motion.velocity)
-    load = (_projectile_segment(options.projectile), hit, patch)
+    load = (_projectile_segment(options.projectile, plies.system), hit, patch)
     plain = assemble(options, plies, mesh, placed, load, damage, law)
     if motion.energy is not None:
         plain = with_energy(plain, motion.energy)
@@ -332,7 +341,9 @@ def author(options: ImpactOptions) -> Authored:
     if isinstance(options.contact, Sphere) and patch is not None:
         radius = patch.radius or RADIUS_PER_THICKNESS[patch.shape] * plies.thickness
         softest = min(plies.of(layer).ply.e2 for layer in struck)
-        doubts += doubts_of_soft_tip(options.contact, radius, law.k, energy_of(plain), softest)
+        doubts += doubts_of_soft_tip(
+            options.contact, plies.system, radius, law.k, energy_of(plain), softest
+        )
     title = options.title
     if title is None:
         named = title_of(options.plate, options.laminate, plies)
@@ -368,7 +379,7 @@ def assemble(
         mesh.coordinates(),
         mesh.element_cards(),
         *load,
-        _gage_segment(options.gages),
+        _gage_segment(options.gages, plies.system),
         *damage,
         cure_segment(plies, options.cure),
         law,
@@ -473,11 +484,13 @@ def _unit_segment(options: DeckOptions, plies: DeckPlies) -> model.Units | None:
     return model.Units(*units_of(plies.system).values())
 
 
-def _projectile_segment(projectile: AnyProjectile | None) -> model.Projectile | None:
+def _projectile_segment(
+    projectile: AnyProjectile | None, system: str | None
+) -> model.Projectile | None:
     """Return the PROJ segment of a projectile; None for the rod of the report."""
     if projectile is None or isinstance(projectile, model.Projectile):
         return projectile
-    return projectile_segment(projectile)
+    return projectile_segment(projectile_in_units(projectile, system))
 
 
 def _preload_segment(options: DeckOptions, plies: DeckPlies) -> model.Preload | None:
@@ -492,10 +505,17 @@ def _preload_segment(options: DeckOptions, plies: DeckPlies) -> model.Preload | 
     return model.Preload(*map(float, numbers))
 
 
-def _gage_segment(places: Iterable[Sequence[float]]) -> model.Gages | None:
+def _gage_segment(
+    places: Iterable[tuple[float | str, float | str, float | str, float]], system: str | None
+) -> model.Gages | None:
     """Return the GAGE segment of strain gages, if there are any."""
+    gages: list[Gage] = []
     try:
-        gages = tuple(Gage(n, *map(float, place)) for n, place in enumerate(places, start=1))
+        for number, (x, y, z, degrees) in enumerate(places, start=1):
+            at_x, at_y, depth = lengths_in_units("gages", (x, y, z), 3, system)
+            gages.append(Gage(number, at_x, at_y, depth, float(degrees)))
+    except ObjectError:
+        raise
     except (TypeError, ValueError):
         raise ObjectError("`gages` are not x, y, z and degrees of each") from None
-    return model.Gages(gages) if gages else None
+    return model.Gages(tuple(gages)) if gages else None

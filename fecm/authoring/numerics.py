@@ -41,11 +41,13 @@ AROUND_LOAD = 3.0
 FEWEST_ELEMENTS = 24
 
 
-def contact_patch(options: DeckOptions) -> Patch | None:
+def contact_patch(options: DeckOptions, system: str | None) -> Patch | None:
     """Return the contact patch; the default is Hertz's if a standard prescribes the test."""
     if options.patch == AUTO:
         return Patch(HERTZ) if options.test else Patch()
-    return parse_patch(options.patch) if isinstance(options.patch, str) else options.patch
+    if isinstance(options.patch, str):
+        return parse_patch(options.patch, system)
+    return options.patch
 
 
 def shear_segment(options: DeckOptions) -> Shear | None:

@@ -11,9 +11,16 @@ from typing import Literal, NamedTuple, Self
 from numpy.typing import ArrayLike
 
 from fecm._table import Table, html_table
-from fecm.authoring.parameters import ObjectError, check_positive, number_pair
+from fecm.authoring.parameters import (
+    ObjectError,
+    check_positive,
+    lengths_in_units,
+    number_pair,
+)
 from fecm.deck import grid as grids
+from fecm.deck.catalogue import STANDARD
 from fecm.deck.grid import EDGES, SUPPORTS, GridSection
+from fecm.deck.quantities import is_number, text_of
 from fecm.problem import plate_mesh
 from fecm.problem.plate_mesh import BOUNDARY, GridLike, MeshLike, PlateMesh
 
@@ -97,8 +104,9 @@ class Plate:
     ----------
     supports : dict
         Supports by the name of an edge or of a group.
-    size : tuple of float or None
-        Sides of a rectangle, or of the window of a fixture, length.
+    size : tuple of float or str, or None
+        Sides of a rectangle, or of the window of a fixture, length. :meth:`sides` converts them to
+        a system of units.
     mesh : tuple of int or None
         Numbers of elements along x and y.
     grading : float
@@ -110,7 +118,7 @@ class Plate:
     """
 
     supports: Mapping[str, str]
-    size: tuple[float, float] | None = None
+    size: tuple[float | str, float | str] | None = None
     mesh: tuple[int, int] | None = None
     grading: float = 1.0
     columns: tuple[GridSection, ...] = field(default=(), repr=False)
@@ -132,7 +140,7 @@ class Plate:
     @classmethod
     def rectangle(
         cls,
-        size: tuple[float, float] | None = None,
+        size: tuple[float | str, float | str] | None = None,
         mesh: tuple[int, int] | None = None,
         *,
         support: Support = "free",
@@ -145,8 +153,9 @@ class Plate:
 
         Parameters
         ----------
-        size : tuple of float
-            Sides along x and y, length.
+        size : tuple of float or str
+            Sides along x and y, length; in the deck's units or with a unit, as in
+            ``("150mm", "100mm")``.
         mesh : tuple of int
             Numbers of elements along x and y.
         support : str
@@ -191,12 +200,23 @@ class Plate:
                 raise ObjectError(f"`columns` and `rows`: {error}") from None
         if columns or rows or size is None or mesh is None:
             raise ObjectError("give `size` and `mesh`, or `columns` and `rows`")
-        x, y = number_pair("size", size)
-        check_positive(size=min(x, y))
+        # Any system: the texts are checked.
+        check_positive(size=min(lengths_in_units("size", size, 2, STANDARD)))
+        x, y = (float(side) if is_number(text_of(side)) else side for side in size)
         nx, ny = number_pair("mesh", mesh)
         if not all(1 <= n <= MOST and n == int(n) for n in (nx, ny)):
             raise ObjectError(f"`mesh` is {mesh!r}, not two numbers of elements from 1 to {MOST}")
         return cls(supports, (x, y), (int(nx), int(ny)), float(grading))
+
+    def sides(self, system: str | None) -> tuple[float, float] | None:
+        """Return the sides of a rectangle, or of the window of a fixture, in a system of units.
+
+        Raises ObjectError if a side has a unit and the system is None.
+        """
+        if self.size is None:
+            return None
+        x, y = lengths_in_units("size", self.size, 2, system)
+        return x, y
 
     @classmethod
     def on_fixture(

@@ -22,9 +22,9 @@ from fecm.authoring.case import (
     Case,
     CasesError,
     Value,
-    normal_pair,
     number_of_text,
     pair_of_text,
+    parts_of_pair,
 )
 from fecm.authoring.parameters import ObjectError, in_units
 from fecm.authoring.plate_values import PlateSetter, check_free_in_plane, free_in_plane
@@ -276,7 +276,7 @@ def without_unit(name: str, text: str, system: str | None) -> str:
     match = re.fullmatch(rf"\s*{NUMBER}\s*(\S.*)?", text)
     if match is None or match[1] is None:
         return text
-    dimension = dimension_of(name)
+    dimension = "length" if name in PAIRS else dimension_of(name)
     if dimension not in EXAMPLES:
         raise CasesError(f"{name} must be a finite number, not `{text.strip()}`")
     if system is None:
@@ -293,13 +293,20 @@ def without_unit(name: str, text: str, system: str | None) -> str:
         ) from None
 
 
+def _normal_pair(name: str, text: str, system: str | None) -> str:
+    """Return a text of two lengths in its usual form, in a system of units."""
+    parts = (without_unit(name, part, system) for part in parts_of_pair(name, text))
+    form, _ = PAIRS[name]
+    return form.format(*(repr(number_of_text(name, n)).removesuffix(".0") for n in parts))
+
+
 def parse_value(name: str, text: str, system: str | None = None) -> Value:
     """Parse the value of a name; raise CasesError if it is invalid.
 
     A value with a unit is converted to the given system of units.
     """
     if name in PAIRS:
-        return normal_pair(name, text)
+        return _normal_pair(name, text, system)
     if name == "support" and text.strip() not in SUPPORTS:
         raise CasesError(f"support must be {', '.join(SUPPORTS)}, not `{text.strip()}`")
     if kind_of(name) is ValueKind.TEXT:
@@ -329,7 +336,7 @@ def value_of(name: str, value: object, where: str, system: str | None = None) ->
         and not isinstance(value, str)
     ):
         separator = {"at": ",", "size": "x"}.get(name, "/")
-        value = separator.join(map(str, value))
+        value = separator.join(str(text_of(item)).replace(" ", "") for item in value)
     try:
         # float() raises for other objects than numbers
         text = value if isinstance(value, str) else repr(float(value))  # type: ignore[arg-type]

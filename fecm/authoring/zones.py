@@ -11,7 +11,7 @@ import numpy as np
 from fecm._typing import Bools, Indices
 from fecm.authoring.laminate import Laminate, Layup
 from fecm.authoring.mesh import AnyMesh
-from fecm.authoring.parameters import ObjectError
+from fecm.authoring.parameters import ObjectError, lengths_in_units
 from fecm.deck import model
 from fecm.deck.material_cards import MATERIAL
 from fecm.mechanics.mesh import MeshArrays
@@ -22,7 +22,7 @@ SLACK = 1e-6  # share of its size by which an element may cross the edge of a zo
 CORNERS = 4
 
 # A rectangle x0, y0, x1, y1 or the name of a group of elements, and a layup or a laminate.
-Place = str | Sequence[float]
+Place = str | Sequence[float | str]
 Zone = tuple[Place, Layup | Laminate]
 
 
@@ -45,7 +45,12 @@ def laminates_of(laminate: Laminate, zones: Sequence[Zone]) -> list[Laminate]:
 
 
 def placed_zones(
-    zones: Sequence[Zone], laminates: Sequence[int], mesh: AnyMesh, node: int, doubts: list[str]
+    zones: Sequence[Zone],
+    laminates: Sequence[int],
+    mesh: AnyMesh,
+    node: int,
+    doubts: list[str],
+    system: str | None,
 ) -> ElementLaminates:
     """Return the laminates of the elements. Later zones cover earlier zones.
 
@@ -63,7 +68,7 @@ def placed_zones(
         inside = (
             _elements_of_group(mesh, place)
             if isinstance(place, str)
-            else _elements_of_rectangle(mesh_of_plate, place, doubts)
+            else _elements_of_rectangle(mesh_of_plate, place, doubts, system)
         )
         numbers[inside] = laminate
     struck = int(numbers[(mesh_of_plate.elements == node).any(axis=1)][0])
@@ -83,12 +88,11 @@ def _elements_of_group(mesh: AnyMesh, name: str) -> Indices:
     return surfaces[name]
 
 
-def _elements_of_rectangle(mesh: MeshArrays, place: Sequence[float], doubts: list[str]) -> Bools:
+def _elements_of_rectangle(
+    mesh: MeshArrays, place: Sequence[float | str], doubts: list[str], system: str | None
+) -> Bools:
     """Return the elements that have their centres in a rectangle."""
-    try:
-        x0, y0, x1, y1 = map(float, place)
-    except (TypeError, ValueError):
-        raise ObjectError(f"`zones` is at {place!r}, not x0, y0, x1 and y1 or a group") from None
+    x0, y0, x1, y1 = lengths_in_units("zones", place, CORNERS, system)
     zone = f"`zones` {x0:g},{y0:g},{x1:g},{y1:g}"
     if not (x0 < x1 and y0 < y1):
         raise ObjectError(f"{zone} is empty: x0 and y0 are its lower corner, x1 and y1 its upper")

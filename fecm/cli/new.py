@@ -12,7 +12,6 @@ from click import option
 from click.core import ParameterSource
 
 from fecm._files import check_outputs
-from fecm.authoring.contact import parse_patch
 from fecm.authoring.deck_options import AUTO, ImpactOptions
 from fecm.authoring.new_deck import author
 from fecm.authoring.parameters import ObjectError
@@ -120,7 +119,7 @@ class PlateOptions:
 @click.argument("output", type=FILE_PATH, metavar="DECK")
 @job_options(
     ImpactOptions,
-    patch={"type": Parsed(parse_patch, "PATCH"), "default": "disc"},
+    patch={"default": "disc", "metavar": "PATCH"},
     shear_factor={"type": Parsed(new_values.shear_factor, "K|equi")},
     preload={"type": list_of("NX,NY[,NXY]", str, [2, 3])},
     zones={"type": Parsed(new_values.zone, "X0,Y0,X1,Y1:LAYUP")},
