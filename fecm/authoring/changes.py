@@ -48,14 +48,10 @@ class Parts(NamedTuple):
 
     def check(self) -> None:
         """Raise ObjectError if a part is not an object of fecm."""
-        if self.plate is not None:
-            check_kind("plate", self.plate, Plate)
-        if self.laminate is not None:
-            check_kind("laminate", self.laminate, Laminate)
-        if self.projectile is not None:
-            check_kind("projectile", text_of(self.projectile), AnyProjectile)
-        if self.contact is not None:
-            check_kind("contact", self.contact, AnyContact)
+        check_kind("plate", self.plate, Plate | None)
+        check_kind("laminate", self.laminate, Laminate | None)
+        check_kind("projectile", text_of(self.projectile), AnyProjectile | None)
+        check_kind("contact", self.contact, AnyContact | None)
 
     def with_plate(self, deck: model.Deck, at: tuple[float, float] | None) -> model.Deck:
         """Return the deck with the new laminate and plate; the projectile hits a point."""

@@ -140,8 +140,7 @@ class DeckOptions:
         """Raise ObjectError if a value is not an object of fecm, or a text is invalid."""
         check_kind("plate", self.plate, Plate)
         check_kind("laminate", self.laminate, Laminate)
-        if self.patch is not None:
-            check_kind("patch", self.patch, str | Patch)
+        check_kind("patch", self.patch, str | Patch | None)
         check_choice("shear", self.shear, get_args(Quadrature))
         check_choice("in_plane", self.in_plane, (None, *IN_PLANE))
         if "\n" in (self.title or ""):
@@ -264,10 +263,8 @@ class ImpactOptions(DeckOptions):
     def check(self) -> None:
         """Raise ObjectError if a value is not an object of fecm, or a text is invalid."""
         super().check()
-        if self.projectile is not None:
-            check_kind("projectile", text_of(self.projectile), AnyProjectile)
-        if self.contact is not None:
-            check_kind("contact", self.contact, AnyContact)
+        check_kind("projectile", text_of(self.projectile), AnyProjectile | None)
+        check_kind("contact", self.contact, AnyContact | None)
         check_choice("kinematics", self.kinematics, (None, *get_args(Kinematics)))
 
     def chosen_kinematics(self) -> Kinematics:

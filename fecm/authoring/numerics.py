@@ -71,12 +71,12 @@ def chosen_time_step(options: ImpactOptions, deck: Deck) -> float:
     try:
         return rounded_time_step(critical_time_step(build_plate(deck, mesh)))
     except UnsoundPlateError:
-        if load_deck(replace(deck, macros=program(options, deck, 1.0, 1.0))).errors():
+        if load_deck(replace(deck, macros=impact_program(options, deck, 1.0, 1.0))).errors():
             return 1.0  # the deck is refused later
         raise
 
 
-def program(
+def impact_program(
     options: ImpactOptions,
     deck: Deck,
     dt: float,
@@ -116,13 +116,13 @@ def with_impact_program(
     with_plies = options.damage and deck.has(Allowables)
     elements, until_over = None, duration is None
     if duration is None or with_plies:
-        loaded = load_deck(replace(deck, macros=program(options, deck, dt, dt)))
+        loaded = load_deck(replace(deck, macros=impact_program(options, deck, dt, dt)))
         if loaded.errors():  # the deck is refused later
-            return replace(deck, macros=program(options, deck, dt, duration or dt))
+            return replace(deck, macros=impact_program(options, deck, dt, duration or dt))
         (problem,) = loaded.problems
         duration = contact_duration(problem) if duration is None else duration
         elements = elements_around_load(problem) if with_plies else None
-    macros = program(options, deck, dt, duration, elements, until_over=until_over)
+    macros = impact_program(options, deck, dt, duration, elements, until_over=until_over)
     return replace(deck, macros=macros)
 
 
