@@ -225,3 +225,11 @@ def test_the_mesh_of_a_window_is_obeyed_whatever_the_radius_of_the_patch() -> No
     (wide_mesh, narrow_mesh) = (fecm.read_one(made.stdout).control for made in (wide, narrow))
     assert narrow_mesh.numel == wide_mesh.numel
     assert "is larger than the radius of the patch, 2" in narrow.stderr
+
+
+def test_the_default_mesh_of_a_window_has_elements_as_short_as_the_radius_of_the_patch() -> None:
+    window = ("--fixture", "D7136", *PLATE[:4], "--material", "IM7/8552", *QUICK[2:])
+    for radius, least in ((2.0, 20 * 12 + 1), (20.0, 20 * 12)):
+        deck = new(*window, "--patch", f"disc:{radius}")
+        assert "W447" not in deck.stderr
+        assert fecm.read_one(deck.stdout).control.numel >= least

@@ -10,13 +10,14 @@ from typing import Literal, NamedTuple, Self
 
 from fecm.authoring.laminate import DeckPlies
 from fecm.authoring.parameters import ObjectError, is_finite, lengths_in_units
-from fecm.authoring.plate import MOST, Plate
+from fecm.authoring.plate import MOST, WINDOW_GRADING, WINDOW_MESH, Plate
 from fecm.deck import grid as grids
 from fecm.deck.grid import ElementGrid, GridSection, held_in_plane
 from fecm.deck.model import Boundary, Curvature, Patch
 from fecm.problem.plate_mesh import PlateMesh
 
 MOST_ELEMENTS = 500_000
+LEAST_RADIUS = 1e-3  # smallest radius to refine a mesh to, over the side of the plate
 
 InPlane = Literal["free", "held", "normal", "tangential"]  # u and v on supports
 FREE: InPlane = "free"
@@ -55,7 +56,8 @@ def place_impact(
     If the point is moved to a node, `doubts` gets a text about it, which calls the point `load`.
     """
     point = None if at is None else lengths_in_units("at", at, 2, plies.system)
-    mesh = plate.imported or plate_grid(plate, plies.system, point)
+    radius = None if patch is None else patch.radius
+    mesh = plate.imported or plate_grid(plate, plies.system, point, radius)
     low, high = mesh.extent
     side = min(high[0] - low[0], high[1] - low[1])
     if plies.thickest >= side:
@@ -83,20 +85,30 @@ def place_impact(
     return Placed(mesh, node, patch, (node_x, node_y))
 
 
-def plate_grid(plate: Plate, system: str | None, point: Sequence[float] | None) -> ElementGrid:
+def plate_grid(
+    plate: Plate, system: str | None, point: Sequence[float] | None, radius: float | None
+) -> ElementGrid:
     """Return the grid of a rectangular plate in a system of units, graded towards a point.
 
     The point is the centre if it is None.
 
-    On a fixture, `plate.size` and `plate.mesh` describe the window.
+    On a fixture, `plate.size` and `plate.mesh` describe the window. Its default mesh is refined to
+    the radius of a patch.
     """
+    is_default = plate.fixture and (plate.mesh, plate.grading) == (WINDOW_MESH, WINDOW_GRADING)
     columns, rows = list(plate.columns), list(plate.rows)
     sides = plate.sides(system)
     if sides and plate.mesh:
         whole = plate.fixture.size if plate.fixture else sides
         centre = point or (whole[0] / 2.0, whole[1] / 2.0)
         columns, rows = (
-            _sections(side, count, x - (length - side) / 2.0, plate.grading)
+            _sections(
+                side,
+                count,
+                x - (length - side) / 2.0,
+                plate.grading,
+                radius if is_default else None,
+            )
             for side, count, x, length in zip(sides, plate.mesh, centre, whole, strict=True)
         )
         if plate.fixture:
@@ -110,11 +122,20 @@ def plate_grid(plate: Plate, system: str | None, point: Sequence[float] | None) 
     return grid
 
 
-def _sections(length: float, count: int, centre: float, grading: float) -> list[GridSection]:
-    """Return the sections in one direction, with the smallest elements at `centre`."""
+def _sections(
+    length: float, count: int, centre: float, grading: float, radius: float | None
+) -> list[GridSection]:
+    """Return the sections in one direction, with the smallest elements at `centre`.
+
+    These are refined until their sides fit a radius, if one is given.
+    """
     if grading > 1.0:
-        return grids.graded(length, count, centre, grading)
-    return grids.uniform_section(length, count)
+        sections = grids.graded(length, count, centre, grading)
+    else:
+        sections = grids.uniform_section(length, count)
+    if radius is None or not LEAST_RADIUS * length <= radius < grids.longest_at(sections, centre):
+        return sections
+    return grids.refined_sections(length, count, centre, grading, radius)
 
 
 class Supported(NamedTuple):
