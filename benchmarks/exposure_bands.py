@@ -5,7 +5,7 @@
 runs every plate on 8 to 26 meshes and on a finest one with elements of 0.4 R at the load, R being
 the radius of the circle around the load. The rows are those of tests/data/exposures_on_meshes.csv,
 the finest mesh last. docs/confidence.md has the plates. The constants that were fitted to the set
-`fit` are in fecm/results/exposure_bands.py. A set takes about an hour.
+`fit` are in fecm/judge/exposure_bands.py. A set takes about an hour.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import sys
 from typing import Any, NamedTuple
 
 import fecm
+from fecm.judge.exposure_bands import LoadMesh
 from fecm.mechanics.exposures import CircleStresses
 from fecm.problem.estimates import load_mesh
 from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
-from fecm.results.exposure_bands import LoadMesh
 from fecm.results.exposures import largest_exposures
 
 

@@ -23,13 +23,14 @@ from fecm.deck.catalogue import MATERIALS, read_plies
 from fecm.deck.grid import grid_lines, uniform_section
 from fecm.deck.layup import parse_layup
 from fecm.deck.model import Cure, Expansion, Preload
+from fecm.judge.criteria import ALL_CRITERIA
+from fecm.judge.exposures import LargestExposure
 from fecm.mechanics.failure import CRITERIA, exposure_of, failure_load_factor
 from fecm.mechanics.laminate import LaminateSection, laminate
 from fecm.mechanics.ply_stresses import PlyStresses, Residual, residual_stresses
 from fecm.problem.loading import load_deck
 from fecm.problem.parts import strengths_of_deck
-from fecm.results.criteria import ALL_CRITERIA
-from fecm.results.exposures import LargestExposure, largest_exposures
+from fecm.results.exposures import largest_exposures
 from fecm.results.metrics import EXPOSURES
 from fecm.simulation.run import run_program
 from fecm.simulation.simulation import Simulation

@@ -16,13 +16,13 @@ from fecm import Deck, MeshError
 from fecm.authoring.case import CasesError
 from fecm.authoring.parameters import ObjectError
 from fecm.deck.model import Boundary, Curvature
+from fecm.judge.validity import CURVED
 from fecm.problem.generate import generate, restraint_codes
 from fecm.problem.loading import load_deck
 from fecm.problem.summary import deck_summary
 from fecm.report.content import render
 from fecm.report.report import page_of
 from fecm.results.summary import run_summary as summary_of
-from fecm.results.validity import CURVED
 from tests.calls import call, new
 from tests.pictures import plot
 

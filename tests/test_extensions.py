@@ -18,11 +18,11 @@ from scipy.integrate import trapezoid
 import fecm
 from fecm.authoring.case import CasesError
 from fecm.cli.interrupts import signals
+from fecm.judge.criteria import ALL_CRITERIA
 from fecm.mechanics.failure import puck
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.projectile import OwnProjectile
 from fecm.problem.parts import build_law, build_projectile
-from fecm.results.criteria import ALL_CRITERIA
 from fecm.simulation.job import Solver
 from tests.calls import assert_unusable, call
 from tests.decks import LONG, PROGRAM, small

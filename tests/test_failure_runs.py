@@ -13,6 +13,7 @@ import fecm
 from fecm import Ply, Strengths
 from fecm._text import jsonable
 from fecm.deck.model import Allowables
+from fecm.judge.criteria import ALL_CRITERIA
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.failure import CRITERIA, exposure_of
 from fecm.mechanics.failure_monitor import FailureMonitor
@@ -23,7 +24,6 @@ from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.problem.loading import load_deck
 from fecm.problem.parts import strengths_of_deck
-from fecm.results.criteria import ALL_CRITERIA
 from fecm.results.exposures import largest_exposures
 from fecm.results.sinks import MemorySink
 from fecm.results.summary import about_run, run_summary

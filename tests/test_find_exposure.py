@@ -11,7 +11,8 @@ import pytest
 import fecm
 from fecm.authoring.case import CasesError
 from fecm.deck.units import quantity
-from fecm.results.exposures import band_of_largest, largest_exposures
+from fecm.judge.exposures import band_of_largest
+from fecm.results.exposures import largest_exposures
 from fecm.results.metrics import EXPOSURES
 from fecm.sweeps.search import LEVEL_EXCESS, velocity_at_level
 from tests.calls import assert_unusable, call

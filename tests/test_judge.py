@@ -16,9 +16,8 @@ from matplotlib.text import Text
 
 import fecm
 from fecm import Deck, SweepResult
-from fecm.plot.pictures import draw
-from fecm.problem.loading import load_deck
-from fecm.results.end import (
+from fecm.judge.end import (
+    ENDS,
     Deflection,
     End,
     LastContact,
@@ -27,9 +26,21 @@ from fecm.results.end import (
     ends,
     settled_deflection,
 )
+from fecm.judge.limits import INDENTATION, LIMITS, ModelLimit, TrustLevel
+from fecm.judge.validity import (
+    DEFLECTION,
+    DOUBTS,
+    Extent,
+    InPlane,
+    Judge,
+    counted,
+    in_plane_of,
+    softness,
+)
+from fecm.plot.pictures import draw
+from fecm.problem.loading import load_deck
 from fecm.results.metrics import IndentationMetrics, Projectiles, impact_metrics
 from fecm.results.summary import run_summary
-from fecm.results.validity import LIMITS, Extent, InPlane, counted, in_plane_of, softness
 from fecm.sweeps.statistics import exceedance_bounds, wilson
 from tests.builders import table
 from tests.calls import call
@@ -283,7 +294,7 @@ def test_the_limit_of_the_deflection_depends_on_the_support_in_the_plane() -> No
     assert in_plane_of(codes) is InPlane.UNKNOWN
     codes[:, 1] = 0  # v is free
     assert in_plane_of(codes) is InPlane.HELD
-    assert LIMITS[InPlane.HELD] < LIMITS[InPlane.FREE]
+    assert DEFLECTION[InPlane.HELD].value < DEFLECTION[InPlane.FREE].value
 
 
 def test_a_plate_lies_on_a_window_unless_the_supports_inside_its_outline_hold_u_or_v() -> None:
@@ -418,7 +429,7 @@ def test_a_sweep_counts_what_is_beyond_its_model(tmp_path: Path) -> None:
 
 def test_reasons_of_other_versions_count_together() -> None:
     texts = np.array(["ok", "failed", "", "w > 0.3 h; moon full", "sun low"])
-    found = {reason: some.tolist() for reason, some in counted(texts)}
+    found = {doubt.reason: some.tolist() for doubt, some in counted(texts)}
     assert found == {
         "w > 0.3 h": [False, False, False, True, False],
         "other": [False, False, False, True, True],
@@ -472,6 +483,32 @@ def test_the_json_of_a_run_has_its_end_and_its_validity(tmp_path: Path) -> None:
     assert said["end"] == "in contact, peak not reached"
     assert said["validity"].startswith("peak not reached")
     assert said["metrics"]["threshold_margin"] == "NaN"
+
+
+@pytest.mark.parametrize("limit", LIMITS, ids=lambda limit: limit.reason)
+def test_a_case_beyond_a_limit_has_its_reason_and_a_case_at_it_has_none(limit: ModelLimit) -> None:
+    in_plane = next((place for place, row in DEFLECTION.items() if row is limit), InPlane.HELD)
+    judge, above = Judge(2.0, in_plane), np.array([False, True])
+    bound = 100.0 * limit.value if limit.symbol == "peak force" else judge.largest(limit)
+    largest = {limit: np.where(above, 1.001 * bound, bound)}
+    extent = Extent(np.array([End.OVER, End.OVER]), largest, threshold=100.0)
+    assert judge.validity(extent).tolist() == ["ok", limit.reason]
+    of_rows = Extent(np.array([End.OVER]), {}, of_rows=[limit.reason])
+    assert judge.validity(of_rows).tolist() == [limit.reason]
+    assert DOUBTS[limit.reason] == limit.doubt
+    assert limit.judgement("x", beyond=True).level is limit.doubt.level
+
+
+@pytest.mark.parametrize("end", End)
+def test_an_end_that_leaves_the_peak_open_is_outside_the_model_for_runs_and_cases(end: End) -> None:
+    meaning = ENDS[end]
+    (validity,) = Judge(2.0).validity(Extent(np.array([end]), {})).tolist()
+    peak_known = end in (End.OVER, End.PASSED, End.APART)
+    assert (validity == "ok") == peak_known
+    assert (meaning.level is TrustLevel.OUTSIDE) == (not peak_known)
+    assert ("lower bound" in meaning.words) == (not peak_known)
+    if meaning.doubt is not None:
+        assert validity == meaning.doubt.reason
 
 
 # Linear against nonlinear runs of D7136 with 2.096 mm of [45/0/-45/90]2s IM7/8552 (w/h of the
@@ -543,7 +580,7 @@ def test_the_indentation_of_a_sandwich_is_compared_with_the_face_that_is_struck(
     )
     (problem,) = load_deck(deck.to_text()).problems
     assert problem.laminate.struck_thickness == pytest.approx(0.26)
-    extent = Extent(*(np.array([value]) for value in (End.OVER, 1.0, 0.07, 0.0)))
+    extent = Extent(np.array([End.OVER]), {INDENTATION: np.array([0.07])})
     assert problem.judge.validity(extent).tolist() == ["indentation > h/4"]
-    shallow = replace(extent, indentation=np.array([0.06]))
+    shallow = replace(extent, largest={INDENTATION: np.array([0.06])})
     assert problem.judge.validity(shallow).tolist() == ["ok"]

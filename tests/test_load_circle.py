@@ -9,16 +9,12 @@ import pytest
 
 import fecm
 from fecm import Result
+from fecm.judge.exposure_bands import LoadMesh, is_bounded, mesh_band
+from fecm.judge.exposures import FailureVerdict, LargestExposure, failure_verdict
 from fecm.mechanics.exposures import CircleStresses
 from fecm.mechanics.mesh import element_blocks, inner_corners
 from fecm.problem.loading import load_deck
-from fecm.results.exposure_bands import LoadMesh, is_bounded, mesh_band
-from fecm.results.exposures import (
-    FailureVerdict,
-    LargestExposure,
-    failure_verdict,
-    largest_exposures,
-)
+from fecm.results.exposures import largest_exposures
 from tests.builders import report_plate, square, table
 
 # A load at a corner of elements, on a plate that it bends over 30 R.

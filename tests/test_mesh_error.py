@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import fecm
-from fecm.results.criteria import ALL_CRITERIA
+from fecm.judge.criteria import ALL_CRITERIA
 from tests.calls import call
 from tests.decks import PROGRAM, ROOT, small
 

@@ -25,10 +25,10 @@ from fecm.deck.model import (
     Zones,
 )
 from fecm.deck.segment import Segment
+from fecm.judge.criteria import is_isotropic
 from fecm.mechanics.failure import CRITERIA
 from fecm.problem.loading import load_deck
 from fecm.problem.plate_mesh import plate_mesh
-from fecm.results.criteria import is_isotropic
 from fecm.results.exposures import largest_exposures
 from tests.calls import Done, call
 

@@ -15,6 +15,9 @@ import fecm
 from fecm import Result
 from fecm.deck import model
 from fecm.deck.grid import ElementGrid, uniform_section
+from fecm.judge.end import End
+from fecm.judge.limits import HELD_DEFLECTION
+from fecm.judge.validity import Extent, Judge
 from fecm.mechanics import kernels
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import gauss
@@ -26,11 +29,9 @@ from fecm.mechanics.strains import strains_and_resultants
 from fecm.mechanics.stretching import Stretching
 from fecm.plot.pictures import draw
 from fecm.problem.loading import load_deck
-from fecm.results.end import End
 from fecm.results.sinks import MemorySink
 from fecm.results.summary import run_summary
-from fecm.results.validity import Extent, Judge
-from fecm.simulation import judge
+from fecm.simulation import notes as run_notes
 from fecm.simulation.run import simulate
 from fecm.simulation.simulation import Simulation
 from fecm.verification import decks
@@ -388,8 +389,7 @@ def test_a_deflection_is_a_doubt_of_linear_plates_alone() -> None:
 
 
 def test_a_nonlinear_case_is_not_beyond_the_linear_plate() -> None:
-    zeros = np.zeros(1)
-    extent = Extent(np.array([End.OVER]), zeros, zeros, np.array([20.0]))
+    extent = Extent(np.array([End.OVER]), {HELD_DEFLECTION: np.array([20.0])})
     assert Judge(2.0, nonlinear=True).validity(extent).tolist() == ["ok"]
     assert Judge(2.0).validity(extent).tolist() == ["w > 0.3 h"]
 
@@ -424,13 +424,13 @@ def changed(sink: MemorySink, **constants: float) -> Result:
 def doubts(dt: float = 0.0, **constants: float) -> list[str]:
     """Notes about the membrane of such a run."""
     simulation, sink = finished(dt)
-    return list(judge.doubts(simulation, changed(sink, **constants)))
+    return list(run_notes.doubts(simulation, changed(sink, **constants)))
 
 
 def test_strains_of_the_membrane_count_among_the_strains() -> None:
     simulation, sink = finished()
-    assert judge.largest_strain(simulation, changed(sink, largest_strain=0.0)).value < 0.04
-    assert judge.largest_strain(simulation, changed(sink, largest_strain=0.04)).value == 0.04
+    assert run_notes.largest_strain(simulation, changed(sink, largest_strain=0.0)).value < 0.04
+    assert run_notes.largest_strain(simulation, changed(sink, largest_strain=0.04)).value == 0.04
 
 
 def test_a_membrane_force_that_brings_the_frequency_near_to_the_limit_is_noted() -> None:

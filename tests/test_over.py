@@ -12,8 +12,8 @@ import pytest
 import fecm
 from fecm import Deck
 from fecm.deck.model import Macro
+from fecm.judge.end import End
 from fecm.mechanics.impact_steps import ImpactSteps
-from fecm.results.end import End
 from tests.calls import call
 from tests.decks import LONG, model, small
 from tests.stopped_runs import StoppedError

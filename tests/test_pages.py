@@ -5,24 +5,28 @@ from __future__ import annotations
 import ast
 import re
 import runpy
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
 
 import fecm
 from fecm.deck.units import COEFFICIENT, DENSITY, MASS, MODULUS, TOUGHNESS, VELOCITY, convert
+from fecm.judge import limits
+from fecm.judge.end import ENDS
+from fecm.judge.limits import ModelLimit
 from tests.decks import ROOT
 
 DOCS = ROOT / "docs"
 PACKAGE = ROOT / "fecm"
 # Where the notes of runs and sweeps are written, with the names that hold them; none are all.
 NOTES = {
-    "simulation/judge.py": (),
+    "simulation/notes.py": ("_numerical",),
     "simulation/macros.py": ("PINNED",),
     "location/verdict.py": ("_serious", "_remarks"),
-    "results/end.py": ("OPEN_ENDS", "OPEN_LATER"),
-    "results/validity.py": ("MEANING", "TOO_SOFT", "PRELOADED", "REMEDY", "UNSAFE", "softness"),
+    "judge/end.py": ("DECIDING_STEPS",),
+    "judge/exposure_bands.py": ("coarse_mesh_note",),
+    "judge/validity.py": ("OTHER", "PRELOADED", "UNSAFE", "of_face", "softness"),
     "sweeps/distributions.py": ("doubt", "_of_logarithm"),
     "sweeps/checks.py": (
         "doubtful_values",
@@ -107,8 +111,24 @@ def notes_of(path: Path, names: tuple[str, ...] | None) -> set[str]:
     """Texts of the notes in a module, as far as they are without numbers."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     nodes = handed_over(tree) if names is None else named(tree, names)
-    found = {" ".join(text.split()) for node in nodes for text in texts(node)}
+    return told(text for node in nodes for text in texts(node))
+
+
+def told(templates: Iterable[str]) -> set[str]:
+    """Texts that tell a note from others, between the sizes in templates."""
+    parts = (part for text in templates for part in re.split(r"\{[^}]*\}", text))
+    found = {" ".join(part.split()).removesuffix(",") for part in parts}
     return {text for text in found if len(text.split()) >= FEWEST_WORDS}
+
+
+def rows() -> Iterator[str]:
+    """Texts of the rows of limits and ends that runs and sweeps note."""
+    for row in vars(limits).values():
+        if isinstance(row, ModelLimit):
+            yield from (row.note, row.case, *([row.remedy] if row.note else []))
+    for meaning in ENDS.values():
+        yield from (meaning.where, meaning.what_is_open, meaning.remedy)
+        yield from () if meaning.doubt is None else (meaning.doubt.case,)
 
 
 def sources() -> Iterator[tuple[Path, tuple[str, ...] | None]]:
@@ -123,7 +143,7 @@ def sources() -> Iterator[tuple[Path, tuple[str, ...] | None]]:
 def test_my_run_says_has_every_note_of_a_run_and_of_a_sweep() -> None:
     page = (DOCS / "my-run-says.md").read_text(encoding="utf-8")
     page = " ".join(re.sub(r"^> ", "", page, flags=re.M).split())
-    notes = set().union(*(notes_of(path, names) for path, names in sources()))
+    notes = told(rows()).union(*(notes_of(path, names) for path, names in sources()))
     assert len(notes) > 50
     assert {text for text in notes if text not in page} == set()
 

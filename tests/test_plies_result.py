@@ -11,7 +11,7 @@ import pytest
 import fecm
 from fecm import Result
 from fecm._errors import ResultFileError
-from fecm.results.criteria import ALL_CRITERIA
+from fecm.judge.criteria import ALL_CRITERIA
 from fecm.results.export import dataset_csv_lines, write_vtkhdf
 from fecm.results.exposures import largest_exposures
 from fecm.results.groups import ExportError, NotStoredError

@@ -10,11 +10,11 @@ import pytest
 from fecm import Result
 from fecm._errors import FecmWarning
 from fecm._typing import Array
+from fecm.judge.criteria import ALL_CRITERIA
 from fecm.mechanics.failure import CRITERIA
 from fecm.plot.failure import outline
 from fecm.plot.kinds import PlotError
 from fecm.plot.pictures import draw
-from fecm.results.criteria import ALL_CRITERIA
 from fecm.results.exposures import largest_exposures
 from fecm.results.summary import run_summary
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, PROGRAM, small

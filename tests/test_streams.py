@@ -310,7 +310,7 @@ def test_the_first_signal_ends_a_loop_at_its_next_macro(
 SIGNALLED_IN_HDF5 = """
 import os, signal, sys
 from fecm.__main__ import main
-from fecm.results import hdf5_writer
+from fecm.results import (hdf5_writer)
 
 number, name, plain = int(sys.argv.pop(1)), sys.argv.pop(1), hdf5_writer._Guarded.write
 signal.signal(number, signal.SIG_DFL)

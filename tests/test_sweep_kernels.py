@@ -12,11 +12,11 @@ import fecm
 from fecm import RigidMass, SweepResult
 from fecm._typing import Floats
 from fecm.authoring.case import Case
+from fecm.judge.end import Deflection
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.loading import load_deck
-from fecm.results.end import Deflection
 from fecm.sweeps import backends, methods, responses
 from fecm.sweeps.responses import plate_response
 from tests.decks import PROGRAM, small

@@ -15,8 +15,8 @@ import fecm
 from fecm.authoring.case import Case, CasesError
 from fecm.authoring.values import VARIABLES, Changes, apply_case
 from fecm.deck.model import Deck, Impact, Indentation, Material, Patch
+from fecm.judge.criteria import ALL_CRITERIA
 from fecm.problem.generate import generate
-from fecm.results.criteria import ALL_CRITERIA
 from fecm.results.exposures import largest_exposures
 from fecm.sweeps import methods
 from fecm.sweeps.case_tables import parse_vary, read_cases

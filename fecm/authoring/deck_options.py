@@ -22,9 +22,9 @@ from fecm.deck.catalogue import NamedContact
 from fecm.deck.grid import IN_PLANE
 from fecm.deck.model import Indentation, Patch, Projectile
 from fecm.deck.quantities import text_of
+from fecm.judge.validity import DEFLECTION
+from fecm.judge.validity import InPlane as MembraneEdges
 from fecm.mechanics.projectile import DeckProjectile, RigidMass, Rod
-from fecm.results.validity import LIMITS
-from fecm.results.validity import InPlane as MembraneEdges
 
 AUTO = "auto"  # the default patch: a disc, or Hertz's patch with a standard
 EQUI: Literal["equi"] = "equi"  # shear stiffness from equilibrium
@@ -35,7 +35,8 @@ Kinematics = Literal["auto", "linear", "von-karman"]
 AUTO_KINEMATICS: Kinematics = "auto"  # the static estimate of the deflection decides
 LINEAR: Literal["linear"] = "linear"
 VON_KARMAN: Literal["von-karman"] = "von-karman"
-LIMIT = LIMITS[MembraneEdges.UNKNOWN]  # largest deflection over thickness of a linear plate, auto
+# Largest deflection over the thickness of a linear plate, auto.
+LIMIT = DEFLECTION[MembraneEdges.UNKNOWN].value
 
 AnyProjectile = DeckProjectile | Projectile | str
 

@@ -23,6 +23,7 @@ from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck import model
 from fecm.deck.macros import EXTENDED, TESTS, steps_of_plies, with_outputs
 from fecm.deck.model import Allowables, Deck, Macro, Patch, Shear
+from fecm.judge.validity import IN_PLANE_WORDS
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.points import HERTZ
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
@@ -31,7 +32,6 @@ from fecm.problem.generate import generate
 from fecm.problem.loading import load_deck
 from fecm.problem.parts import build_plate, has_assumed_shear
 from fecm.problem.problem import Problem
-from fecm.results.validity import IN_PLANE_WORDS
 
 ROWS = 200  # default number of stored rows of strains and displacements
 

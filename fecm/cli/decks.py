@@ -34,12 +34,12 @@ from fecm.cli.options import FILE_PATH, MODE_OPTION, Format, format_option, typi
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.reader import load_text
 from fecm.deck.units import unit_names, unit_of
+from fecm.judge.criteria import spelt
 from fecm.listing.slips import REPORT, active_slips
 from fecm.problem.build import RunOptions
 from fecm.problem.deck_check import check_loaded
 from fecm.problem.loading import LoadedDeck, load_deck, sole
 from fecm.problem.problem import Problem
-from fecm.results.criteria import spelt
 
 
 def count_findings(findings: Sequence[Finding]) -> str:

@@ -49,6 +49,8 @@ from fecm.identification.misfit import (
     wrong_model,
 )
 from fecm.identification.result import CARDS, Identification
+from fecm.judge.end import PEAK_NOT_REACHED
+from fecm.judge.validity import DOUBTS, OTHER, reasons_of
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import law_name, own_law
 from fecm.problem.loading import AnyDeck, sole_problem
@@ -56,7 +58,6 @@ from fecm.problem.memory import needed_bytes
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
 from fecm.results.comparison import Measurement, Source, measurement_of
-from fecm.results.validity import MEANING, Reason, reasons_of
 from fecm.simulation.job import Price
 from fecm.studies.rod_test.filters import FILTERS, Filter, filter_of
 from fecm.sweeps.backends import ImpulseResponse, shares_plate
@@ -482,7 +483,8 @@ def _doubts(fit: Identification, solution: FittedPoints, model: ForceModel) -> I
     if not outcome.fine[0]:
         yield f"the run of the fitted deck fails: {outcome.status[0]}"
     # The measurement may end in contact. Other limits of the model bias the parameters.
-    limits = [r for r in reasons_of(str(outcome.columns["validity"][0])) if r != Reason.OPEN]
+    doubts = [DOUBTS.get(r, OTHER) for r in reasons_of(str(outcome.columns["validity"][0]))]
+    limits = [doubt.case for doubt in doubts if doubt != PEAK_NOT_REACHED]
     if limits:
-        meaning = ", ".join(MEANING.get(reason, reason) for reason in limits)
+        meaning = ", ".join(limits)
         yield f"the run of the fitted deck is {meaning}: the parameters make up for what it lacks"

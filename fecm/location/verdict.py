@@ -22,6 +22,7 @@ from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.deck.units import unit_of
 from fecm.identification.misfit import COLOURED
+from fecm.judge.limits import STRAIN
 from fecm.location.fit import CLEAR, LocationFit, PlaceTrial
 from fecm.location.location import Location
 from fecm.location.search import Region
@@ -309,7 +310,6 @@ def _format_factor(factor: float) -> str:
 RIVAL = 1.1  # misfit ratio below which a second place can hardly be told from the first
 NOT_DESCRIBED = 1.5  # misfit above which the model does not describe the strains
 UNLIKELY = 3.0  # standard deviations of the misfit that noise explains
-LARGE = 0.01  # strain near failure: plies fail at one to two per cent
 LEFT = 0.5  # unexplained share of a gage's squares above which the gage is not described
 OF_MESH = 0.8  # share of the mesh in the standard deviation of the place, for a note
 VAGUE = 0.25  # standard deviation, over the side of the region, of a place not determined
@@ -380,7 +380,7 @@ def _reasons_to_reject(location: Location, region: Region) -> Iterator[str]:
             f"strains are left; {compare}"
         )
     largest = float(np.abs(location.strains).max())
-    if largest > LARGE:
+    if largest > STRAIN.value:  # plies fail at one to two per cent
         yield (
             f"the largest strain is {100.0 * largest:.2g} %, at which plies fail: the peak force "
             "is doubtful; are the strains in per cent?"

@@ -44,7 +44,7 @@ class ResultRow(IntEnum):
     # Without the rigid motion of a plate that is not held:
     LARGEST_DW = 9  # largest change of the displacement in a step
     BENT_WORK = 10  # work of the contact force on the plate
-    COMPLIANCE = 11  # largest w^2/(2 E) of the plate; see :data:`~fecm.results.end.LEAST_WORK`
+    COMPLIANCE = 11  # largest w^2/(2 E) of the plate; see :data:`~fecm.judge.end.LEAST_WORK`
     CONTACT_WORK = 12  # work of the contact force on the indentation
 
 

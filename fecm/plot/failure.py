@@ -16,6 +16,8 @@ from matplotlib.ticker import MaxNLocator
 from fecm._errors import warn
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Material
+from fecm.judge.criteria import failure_in_words
+from fecm.judge.exposures import LargestExposure
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA, UNIDIRECTIONAL
 from fecm.mechanics.failure_monitor import UNKNOWN
@@ -24,8 +26,7 @@ from fecm.plot.data import mesh_of, require_datasets, result_deck, struck
 from fecm.plot.kinds import Picture, PlotError, Width
 from fecm.plot.plate import aspect, mark_impact
 from fecm.problem.parts import rules
-from fecm.results.criteria import spelt
-from fecm.results.exposures import LargestExposure, largest_exposures, near_load
+from fecm.results.exposures import largest_exposures, near_load
 from fecm.results.plies import places
 from fecm.results.result import Result
 
@@ -120,9 +121,9 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: Width =
 
 def _in_words(exposure: LargestExposure) -> str:
     """Format an exposure for a title; names of materials take their own line."""
-    separator = "\n" if exposure.materials else " "
-    size = f"{exposure.exposure:.4g} ({spelt(exposure.criterion)})"
-    return f"{size}: {exposure.mode},{separator}{exposure.plies}"
+    words = failure_in_words(exposure.criterion, exposure.mode, exposure.plies)
+    text = f"{exposure.exposure:.4g}: {words}"
+    return text.replace(", ", ",\n", 1) if exposure.materials else text
 
 
 def _panels(width: Width, high: float, bars: int) -> tuple[Figure, Axes, Axes]:

@@ -12,12 +12,12 @@ from matplotlib.lines import Line2D
 from fecm._errors import warn
 from fecm._typing import Array
 from fecm.deck.model import Material
+from fecm.judge.threshold import from_threshold
 from fecm.plot import data, style
 from fecm.plot.kinds import Against, Face, Picture, PlotError, Width
 from fecm.results.comparison import Source, compare_force, measurement_of
 from fecm.results.result import Result
 from fecm.results.run_metrics import start_w_of
-from fecm.results.validity import from_threshold
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,11 +11,13 @@ from matplotlib.ticker import MaxNLocator
 from fecm._errors import did_you_mean, warn
 from fecm._typing import Array, Bools, Indices
 from fecm.authoring.values import NAMES, VARIABLES, ValueKind
+from fecm.judge.end import PEAK_NOT_REACHED
+from fecm.judge.limits import THRESHOLD
+from fecm.judge.validity import counted
 from fecm.plot import style
 from fecm.plot.kinds import PlotError
 from fecm.results.metrics import COLUMNS, VERDICTS
 from fecm.results.metrics import INTEGERS as COUNTS
-from fecm.results.validity import MEANING, Reason, counted
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.summary import reasons
 
@@ -201,9 +203,9 @@ def _warn_of_gaps(
 
 def beyond(sweep: SweepResult, rows: Indices) -> dict[str, Bools]:
     """Return masks of the cases beyond the range of the model, by reason."""
-    elsewhere = (Reason.OPEN, Reason.DELAMINATED)  # these have their own mark and line
+    elsewhere = (PEAK_NOT_REACHED, THRESHOLD.doubt)  # these have their own mark and line
     masks = counted(sweep.validity[rows])
-    return {MEANING[reason]: mask for reason, mask in masks if reason not in elsewhere}
+    return {doubt.case: mask for doubt, mask in masks if doubt not in elsewhere}
 
 
 def ended(sweep: SweepResult, rows: Indices) -> dict[str, Bools]:

@@ -44,11 +44,11 @@ from fecm.problem.parts import (
 from fecm.problem.problem import ContactPatch, Problem
 
 if TYPE_CHECKING:
+    from fecm.judge.exposure_bands import LoadMesh
     from fecm.mechanics.exposures import PlyPoints
     from fecm.mechanics.failure_monitor import FailureMonitor
     from fecm.mechanics.ply_stresses import Residual
     from fecm.mechanics.stretching import Stretching
-    from fecm.results.exposure_bands import LoadMesh
 
 ENERGY_LIMIT = 0.1  # relative error of the energy balance that ends a run
 WORTH_SHARING = 100_000  # number of equations above which threads save more than they cost

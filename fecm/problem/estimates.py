@@ -16,6 +16,8 @@ from fecm._errors import FecmError
 from fecm._typing import Indices
 from fecm.deck import model
 from fecm.deck.model import Impact
+from fecm.judge.exposure_bands import LoadMesh
+from fecm.judge.limits import ELEMENTS_PER_WAVE
 from fecm.mechanics.laminate import effective_rigidity
 from fecm.mechanics.mesh import longest_sides
 from fecm.mechanics.quick_models import (
@@ -29,10 +31,7 @@ from fecm.mechanics.solutions import ConvergenceError, SingularStiffnessError, s
 from fecm.problem.contact_estimates import wave_impedance
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
-from fecm.results.exposure_bands import LoadMesh
 
-# Elements per bending wave of the contact's duration that are enough for a peak.
-ENOUGH_PER_WAVE = 8
 MOST_ERROR = 0.5  # largest mesh error of the peak that is estimated
 NINE_NODES = 9
 CORNERS = 4  # of an element of nine nodes, its first ones
@@ -128,8 +127,8 @@ def estimated_mesh_error(elements: float, slenderness: float, shear: int) -> flo
     the order L2.
     """
     if shear < FULL:
-        return 0.045 * ENOUGH_PER_WAVE / elements
-    return (0.031 + 0.0011 * slenderness**2) * (ENOUGH_PER_WAVE / elements) ** 2
+        return 0.045 * ELEMENTS_PER_WAVE.value / elements
+    return (0.031 + 0.0011 * slenderness**2) * (ELEMENTS_PER_WAVE.value / elements) ** 2
 
 
 def format_mesh_error(error: float) -> str:

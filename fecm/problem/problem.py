@@ -13,6 +13,7 @@ from fecm._typing import Bools, Floats, Indices
 from fecm.deck import model
 from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
 from fecm.deck.model import Deck
+from fecm.judge.validity import Judge, in_plane_of
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA, PlyExposure, largest_in_plies
 from fecm.mechanics.interpolation import W
@@ -46,7 +47,6 @@ from fecm.problem.parts import (
 from fecm.problem.symmetry import PartSymmetry, symmetry_of
 from fecm.results.groups import GROUPS
 from fecm.results.schema import values_per_row
-from fecm.results.validity import Judge, in_plane_of
 
 if TYPE_CHECKING:
     from fecm.mechanics.ply_stresses import Residual

@@ -18,6 +18,7 @@ from fecm._typing import FiniteFloat, Floats
 from fecm.deck.macros import flat
 from fecm.deck.model import Cure, Impact, Shear
 from fecm.deck.units import MASS, MODULUS, mass_in_si, quantity, unit_names, unit_of
+from fecm.judge.threshold import from_threshold
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
@@ -29,7 +30,6 @@ from fecm.problem.estimates import MOST_SOLVED, format_mesh_error, resolution
 from fecm.problem.problem import Problem
 from fecm.problem.rules.preload import FEWEST_ELEMENTS
 from fecm.results.stored import whole_plate
-from fecm.results.validity import from_threshold
 
 ROOM = 0.6  # share of the critical time step below which the step that DT 0 takes is shown
 LABEL_WIDTH = 20  # of the lines of a summary, at least

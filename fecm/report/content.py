@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
@@ -24,28 +23,11 @@ from fecm._table import Cell, Row, ShownNumber, Table
 from fecm._text import DIGITS, printable
 from fecm._version import __version__
 from fecm.deck.units import quantity
+from fecm.judge.limits import Judgement, TrustLevel
 from fecm.plot.pictures import require_matplotlib
 
 UNKNOWN = "–"  # of a value that is not known
 MOST_TEXT = 200_000  # characters of a listing
-
-
-class TrustLevel(StrEnum):
-    """Level of trust in a number."""
-
-    WITHIN = "within range"
-    DOUBTFUL = "doubtful"
-    OUTSIDE = "outside the model"
-    UNJUDGED = "not judged"
-
-
-class Judgement(NamedTuple):
-    """Quantity, its size, and its level of trust."""
-
-    level: TrustLevel
-    name: str
-    size: Cell
-    words: str = ""
 
 
 @dataclass(frozen=True)

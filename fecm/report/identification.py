@@ -9,14 +9,13 @@ from fecm._table import ShownNumber
 from fecm._text import FITTED_DIGITS
 from fecm.deck.units import readable, unit_names, unit_of
 from fecm.identification.result import Identification, identification_tables
+from fecm.judge.limits import Judgement, TrustLevel
 from fecm.plot.histories import force_fit_picture
 from fecm.report.content import (
-    Judgement,
     Judgements,
     PageBlock,
     PagePicture,
     ReportPage,
-    TrustLevel,
     listing,
     note_list,
     number_with_unit,

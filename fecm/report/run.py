@@ -14,16 +14,19 @@ from fecm._table import Cell, Row, ShownNumber
 from fecm.deck import model
 from fecm.deck.layup import layup_text
 from fecm.deck.units import MASS, mass_in_si, quantity, unit_names, unit_of
+from fecm.judge.criteria import failure_in_words, spelt
+from fecm.judge.end import OPEN_PEAKS
+from fecm.judge.exposures import no_failure, on_this_mesh
+from fecm.judge.limits import Judgement, TrustLevel
+from fecm.judge.threshold import from_threshold
 from fecm.problem.problem import Problem
 from fecm.report import figures
 from fecm.report.content import (
     UNKNOWN,
-    Judgement,
     Judgements,
     PageBlock,
     PageSection,
     ReportPage,
-    TrustLevel,
     listing,
     note_list,
     number_with_unit,
@@ -33,26 +36,21 @@ from fecm.report.content import (
 )
 from fecm.report.model import impactor, of_problem, plate_extent
 from fecm.report.trust import deck_problem, judgements
-from fecm.results.criteria import spelt
-from fecm.results.exposures import (
-    FailureVerdict,
-    failure_verdict,
-    first_failures,
-    largest_exposures,
-    threshold_energy,
-)
+from fecm.results.exposures import first_failures, largest_exposures, threshold_energy
 from fecm.results.metrics import INTEGERS, METRICS
 from fecm.results.result import Result
 from fecm.results.stored import whole_plate
 from fecm.results.summary import (
-    UNDECIDED,
+    THRESHOLD_EVENT,
     elastic_doubt,
     later_contact,
     lowest_criterion,
     radii_of,
     run_table,
+    search_for,
+    threshold_force,
+    threshold_verdict,
 )
-from fecm.results.validity import from_threshold
 
 WORDS = {
     TrustLevel.WITHIN: "All quantities are within the range of the model.",
@@ -191,7 +189,7 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     peak = int(force.argmax())
     parts = []
     if force[peak] > 0.0:
-        at_least = "at least " if result.end in UNDECIDED else ""
+        at_least = "at least " if result.end in OPEN_PEAKS else ""
         size = f"{at_least}{in_units(force[peak], 'force')} at {in_units(time[peak], 'time')}"
         size += later_contact(result)
         doubt = elastic_doubt(result, float(force[peak]))
@@ -199,31 +197,22 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     else:
         parts.append("there was no contact")
     if result.threshold:
-        limit = in_units(float(result.threshold["force"]), "force")
-        at_the_latest = from_threshold(result.threshold.get("number"))
-        named = "; ".join([f"delamination {at_the_latest} {limit}", *lowest_criterion(result)])
+        limit = "; ".join([f"delamination {threshold_force(result)}", *lowest_criterion(result)])
+        parts.append(f"the threshold ({limit}) is {threshold_verdict(result)}")
         if math.isfinite(float(result.threshold["time"])):
-            energy = in_units(threshold_energy(result), "force*length")
-            parts.append(
-                f"passes the delamination threshold ({named}) when the projectile has given up "
-                f"{energy} (fecm sweep DECK --find velocity --until "
-                "peak_force=threshold finds the impact energy that reaches it)"
-            )
-        else:
-            ends = " by the end of the run" if result.end in UNDECIDED else ""
-            parts.append(f"stays below the delamination threshold ({named}){ends}")
+            parts.append(search_for(*THRESHOLD_EVENT))
+    largest = largest_exposures(result)
     if first := first_failures(result)[:1]:
         failure = first[0]
-        text = f"first failure: {failure.mode} ({spelt(failure.criterion)}), {failure.where}"
+        words = failure_in_words(failure.criterion, failure.mode, failure.where)
+        text = f"first failure: {on_this_mesh(largest)}{words}"
         if not math.isnan(failure.force):
             energy = in_units(failure.energy, "force*length")
             at_force = in_units(failure.force, "force")
             text = f"{text}, at {at_force}, when the projectile has given up {energy}"
         parts.append(text)
-    elif largest := largest_exposures(result):
-        is_open = failure_verdict(largest) is FailureVerdict.OPEN
-        open_words = "; finer meshes may (open)" if is_open else ""
-        parts.append(f"no ply reaches an exposure of 1 on this mesh{open_words}")
+    elif largest:
+        parts.append(f"first failure: {no_failure(largest, result.end)}")
     if problem is None:
         text = "; ".join(parts)
         return f"{text[0].upper()}{text[1:]}."
@@ -262,7 +251,7 @@ def _metrics(results: Mapping[str, Result]) -> list[PageBlock]:
     """Return a table of impact metrics with a column for each result."""
     metrics = {name: result.metrics for name, result in results.items()}
     rows: list[Row] = []
-    if any(result.end in UNDECIDED for result in results.values()):
+    if any(result.end in OPEN_PEAKS for result in results.values()):
         bounds = [_lower_bound(result) for result in results.values()]
         rows.append(("largest force by the end", *bounds, "lower bound of the peak force"))
     for key, (description, dimension) in METRICS.items():
@@ -297,7 +286,7 @@ def _elastic_peaks(results: Mapping[str, Result]) -> str:
 
 def _lower_bound(result: Result) -> Cell:
     """Return the largest force of a run whose peak is open."""
-    if result.end not in UNDECIDED:
+    if result.end not in OPEN_PEAKS:
         return UNKNOWN
     force = float(result.whole("history/force").max())
     return number_with_unit(force, unit_of("force", result.units))

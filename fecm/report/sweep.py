@@ -11,15 +11,15 @@ import numpy as np
 from fecm._table import Cell, Row, ShownNumber
 from fecm._text import DECK_DIGITS
 from fecm.deck.units import quantity, short_name, unit_of
+from fecm.judge.limits import Judgement, TrustLevel
+from fecm.judge.validity import counted
 from fecm.plot.kinds import PictureKind
 from fecm.report import figures
 from fecm.report.content import (
     UNKNOWN,
-    Judgement,
     Judgements,
     PageBlock,
     ReportPage,
-    TrustLevel,
     listing,
     note_list,
     number_with_unit,
@@ -29,7 +29,6 @@ from fecm.report.content import (
     worst,
 )
 from fecm.results.metrics import RATIO, VERDICTS, described
-from fecm.results.validity import MEANING, Reason, counted
 from fecm.sweeps.random import Design
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.statistics import QUANTILES, RandomResult
@@ -37,8 +36,6 @@ from fecm.sweeps.summary import MAIN, chance, sweep_verdict, symmetry_text, thre
 
 FOUND = "found_velocity"
 PEAK = "peak_force"
-# Reasons that make results elastic predictions; with other reasons they are outside the model.
-ELASTIC = (Reason.BROKEN, Reason.DELAMINATED, Reason.OTHER)
 MOST_NAMED = 4  # values that name a case
 MOST_VALUES = 8  # different values of a name that are listed one by one
 MOST_COMBINATIONS = 12  # of varied values, whose statistics are listed
@@ -117,12 +114,9 @@ def _judgements(sweep: SweepResult) -> Iterator[Judgement]:
         yield Judgement(
             TrustLevel.OUTSIDE, "failed", ShownNumber(failed, f"{failed} of {count}"), words
         )
-    for reason, mask in counted(sweep.validity):
-        cases = int(mask.sum())
-        level = TrustLevel.DOUBTFUL if reason in ELASTIC else TrustLevel.OUTSIDE
-        yield Judgement(
-            level, str(reason), ShownNumber(cases, f"{cases} of {count}"), MEANING[reason]
-        )
+    for doubt, mask in counted(sweep.validity):
+        size = ShownNumber(int(mask.sum()), f"{mask.sum()} of {count}")
+        yield Judgement(doubt.level, doubt.reason, size, doubt.case)
     if still := int(sweep.still_in_contact.sum()):
         words = "what comes after the end is open"
         size = ShownNumber(still, f"{still} of {count}")

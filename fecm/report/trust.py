@@ -10,76 +10,40 @@ import numpy as np
 from fecm._errors import ResultFileError
 from fecm._table import Cell, ShownNumber
 from fecm.deck.macros import flat
+from fecm.judge.criteria import spelt
+from fecm.judge.end import ENDS, OPEN_PEAKS
+from fecm.judge.exposures import FINER_MESHES_DECIDE, FailureVerdict, failure_verdict
+from fecm.judge.limits import (
+    BALANCED,
+    ELEMENTS_PER_WAVE,
+    ENERGY_BALANCE,
+    EXPOSURE,
+    FAIL_EVALUATIONS,
+    INDENTATION,
+    ITERATION,
+    POINT_FORCE,
+    SHEAR_FACTOR,
+    SLOPE,
+    STRAIN,
+    THRESHOLD,
+    TIME_STEP,
+    Judgement,
+    TrustLevel,
+)
+from fecm.judge.validity import CURVED, of_face, reasons_of
 from fecm.listing.slips import LISTING
-from fecm.problem.estimates import ENOUGH_PER_WAVE, format_mesh_error
+from fecm.problem.estimates import format_mesh_error
 from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
 from fecm.problem.summary import deck_summary
-from fecm.report.content import (
-    UNKNOWN,
-    Judgement,
-    TrustLevel,
-    number_with_unit,
-    share,
-)
-from fecm.results.criteria import spelt
-from fecm.results.end import End
-from fecm.results.exposures import (
-    FEWEST,
-    FailureVerdict,
-    evaluations_in_contact,
-    failure_verdict,
-    largest_exposures,
-)
+from fecm.report.content import UNKNOWN, number_with_unit, share
+from fecm.results.exposures import evaluations_in_contact, largest_exposures
 from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
 from fecm.results.run_metrics import impact_energy
-from fecm.results.summary import UNDECIDED
-from fecm.results.validity import (
-    BENT,
-    CROSSED,
-    CURVED,
-    INDENTATION,
-    SLOPE,
-    STRAIN,
-    Reason,
-    reasons_of,
-)
+from fecm.results.summary import threshold_verdict
 
-# Errors of the energy balance, relative to the energy put in, up to which it is fine.
-BALANCED = 1e-3
-# Change of the static deflection by the shear stiffness from equilibrium that is worth a doubt.
-NOTABLE_SHEAR = 0.02
 SLOPES = "membrane/largest_slope"  # of a nonlinear plate, at the stored rows
-SO_FAR = "so far: the run ends before its peak"
-ENDS = {
-    End.OVER: (TrustLevel.WITHIN, "contact over", ""),
-    End.APART: (
-        TrustLevel.DOUBTFUL,
-        "peak passed, may touch again",
-        "what another contact changes is open: rebound, energies, permanent indentation",
-    ),
-    End.PASSED: (
-        TrustLevel.DOUBTFUL,
-        "in contact, peak passed",
-        "what comes after the end is open: permanent indentation, rebound, energies",
-    ),
-    End.RISING: (
-        TrustLevel.OUTSIDE,
-        "in contact, peak not reached",
-        "the largest force is a lower bound of the peak; take more steps",
-    ),
-    End.BETWEEN: (
-        TrustLevel.OUTSIDE,
-        "between two contacts",
-        "the projectile still approaches: the largest force is a lower bound; take more steps",
-    ),
-    End.AGAIN: (
-        TrustLevel.OUTSIDE,
-        "may touch again",
-        "the projectile leaves slowly: the largest force is a lower bound; take more steps",
-    ),
-}
 
 
 def deck_problem(result: Result) -> tuple[Problem | None, list[str]]:
@@ -109,9 +73,8 @@ def judgements(result: Result, problem: Problem | None) -> Iterator[Judgement]:
         yield Judgement(
             TrustLevel.OUTSIDE, "notes of the run", ShownNumber(count, str(count)), words
         )
-    if result.end is not None:
-        level, size, words = ENDS[result.end]
-        yield Judgement(level, "end of the run", size, words)
+    if (end := result.end) is not None:
+        yield Judgement(ENDS[end].level, "end of the run", str(end), ENDS[end].words)
     if problem is not None:
         yield from _reached(result, problem, reasons)
     yield from _failure(result)
@@ -126,46 +89,40 @@ def _reached(result: Result, problem: Problem, reasons: list[str]) -> Iterator[J
     """Compare deflection, strain and indentation with the limits of the model."""
     if "history/plate_w" not in result:
         return
-    limits = problem.judge
-    w = float(result["history/plate_w"].max(initial=0.0)) / limits.thickness
-    bent = BENT[limits.in_plane] in reasons
+    judge = problem.judge
+    limit = judge.deflection
+    w = float(result["history/plate_w"].max(initial=0.0)) / judge.thickness
+    bent = limit.reason in reasons
+    under_load, size = f"{limit.quantity} under the load", ShownNumber(w, f"{w:.3g} h")
     if result.attributes_of("history").get(MOBILITY):
         if bent:
             words = "less the rigid motion of the plate; see the notes"
-            yield Judgement(TrustLevel.OUTSIDE, "deflection", f"beyond {limits.limit} h", words)
+            yield limit.judgement(f"beyond {limit.shown}", beyond=True, words=words)
+    elif problem.plate.nonlinear:
+        words = "the plate is nonlinear (von Kármán); its slope is the limit"
+        yield limit.judgement(size, beyond=False, quantity=under_load, words=words)
     else:
-        size = ShownNumber(w, f"{w:.3g} h")
-        if problem.plate.nonlinear:
-            words = "the plate is nonlinear (von Kármán); its slope is the limit"
-            yield Judgement(TrustLevel.WITHIN, "deflection under the load", size, words)
-        else:
-            words = f"a linear plate holds up to {limits.limit} h with these supports"
-            if bent:
-                words = f"{words}; {limits.softness(max(w, limits.limit))}"
-                words = f"{words}; {CURVED}" if limits.curved else words
-            level = TrustLevel.OUTSIDE if bent else TrustLevel.WITHIN
-            yield Judgement(level, "deflection under the load", size, words)
-    for reason, name, what, limit in (
-        (Reason.STEEP, "slope", "the theory holds", f"up to {SLOPE}"),
-        (Reason.STRAINED, "strain", "linear plies hold", f"up to {100.0 * STRAIN:g} %"),
-    ):
-        if reason == Reason.STEEP and not problem.plate.nonlinear:
-            continue
-        beyond = reason in reasons
-        level = TrustLevel.OUTSIDE if beyond else TrustLevel.WITHIN
+        words = limit.page
+        if bent:
+            words = f"{words}; {judge.softness(max(w, limit.value))}"
+            words = f"{words}; {CURVED}" if judge.curved else words
+        yield limit.judgement(size, beyond=bent, quantity=under_load, words=words)
+    for limit in (SLOPE, STRAIN) if problem.plate.nonlinear else (STRAIN,):
+        beyond = limit.reason in reasons
         place: Cell = "beyond the limit" if beyond else "below the limit"
-        words = f"{what} {limit}"
-        if reason == Reason.STEEP and SLOPES in result:
+        words = limit.page
+        if limit is SLOPE and SLOPES in result:
             largest = float(result[SLOPES].max(initial=0.0))
             place = ShownNumber(largest, f"{largest:.3g}")
         elif beyond:
             words = f"{words}; the notes of the run have its size"
-        yield Judgement(level, name, place, words)
-    depth = float(result["history/indentation"].max(initial=0.0)) / limits.indented
-    level = TrustLevel.OUTSIDE if Reason.SOFT in reasons else TrustLevel.WITHIN
-    of_face = " of the struck face" if limits.struck else ""
-    words = f"the contact law of a half-space holds up to {INDENTATION:g} h{of_face}"
-    yield Judgement(level, "indentation", ShownNumber(depth, f"{depth:.3g} h"), words)
+        yield limit.judgement(place, beyond=beyond, words=words)
+    depth = float(result["history/indentation"].max(initial=0.0)) / judge.indented
+    yield INDENTATION.judgement(
+        ShownNumber(depth, f"{depth:.3g} h"),
+        beyond=INDENTATION.reason in reasons,
+        words=f"{INDENTATION.page}{of_face(judge)}",
+    )
 
 
 def _failure(result: Result) -> Iterator[Judgement]:
@@ -175,25 +132,19 @@ def _failure(result: Result) -> Iterator[Judgement]:
         yield Judgement(TrustLevel.UNJUDGED, "failure of plies", UNKNOWN, "the deck has no FAIL")
         return
     top = max(largest, key=lambda row: row.exposure)
-    broken = top.exposure > CROSSED
-    words = f"{spelt(top.criterion)}; " + (
-        "the run is elastic beyond the first failure" if broken else "1 is failure"
-    )
-    if is_open := result.end in UNDECIDED and not broken:
-        words = f"{words}; {SO_FAR}"
+    broken = top.exposure > EXPOSURE.value
+    words, end = f"{spelt(top.criterion)}; {EXPOSURE.page}", result.end
+    if is_open := end in OPEN_PEAKS and not broken:
+        words = f"{words}; at least, as the run ends {ENDS[end].brief}"
     decided = failure_verdict(largest) is not FailureVerdict.OPEN
     if not decided:
-        words = f"{words}; finer meshes may decide otherwise: open"
-    level = TrustLevel.DOUBTFUL if broken or is_open or not decided else TrustLevel.WITHIN
-    yield Judgement(level, "largest exposure", number_with_unit(top.exposure, digits=4), words)
+        words = f"{words}; {FINER_MESHES_DECIDE}"
+    size = number_with_unit(top.exposure, digits=4)
+    yield EXPOSURE.judgement(size, beyond=broken or is_open or not decided, words=words)
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:
-        few = count < FEWEST
-        yield Judgement(
-            TrustLevel.DOUBTFUL if few else TrustLevel.WITHIN,
-            "evaluations of FAIL during contact",
-            ShownNumber(count, str(count)),
-            f"below {FEWEST} the largest exposure may be missed" if few else "",
+        yield FAIL_EVALUATIONS.judgement(
+            ShownNumber(count, str(count)), beyond=count < FAIL_EVALUATIONS.value
         )
 
 
@@ -206,12 +157,11 @@ def _threshold(result: Result) -> Iterator[Judgement]:
         return
     largest = float(result.whole("history/force").max(initial=0.0))
     ratio = largest / float(result.threshold["force"])
-    crossed = ratio > CROSSED
-    is_open = result.end in UNDECIDED and not crossed
-    words = "the run is elastic above the threshold" if crossed else SO_FAR if is_open else ""
-    level = TrustLevel.DOUBTFUL if crossed or is_open else TrustLevel.WITHIN
-    yield Judgement(
-        level, "largest force over the threshold", number_with_unit(ratio, digits=3), words
+    crossed = ratio > THRESHOLD.value
+    yield THRESHOLD.judgement(
+        number_with_unit(ratio, digits=3),
+        beyond=crossed or result.end in OPEN_PEAKS,
+        words="; ".join([threshold_verdict(result), *([THRESHOLD.page] if crossed else [])]),
     )
 
 
@@ -219,39 +169,30 @@ def _mesh(problem: Problem) -> Iterator[Judgement]:
     """Judge mesh, time step, contact patch and shear stiffness."""
     summary = deck_summary(problem)
     if (count := summary.elements_per_wave) is not None:
-        coarse = count < ENOUGH_PER_WAVE
-        words = f"{ENOUGH_PER_WAVE} are enough for a peak"
+        words = ELEMENTS_PER_WAVE.page
         if summary.mesh_error is not None:
             words = f"{words}; {format_mesh_error(summary.mesh_error)}"
-        level = TrustLevel.DOUBTFUL if coarse else TrustLevel.WITHIN
-        yield Judgement(
-            level, "elements per bending wave", number_with_unit(count, digits=3), words
+        yield ELEMENTS_PER_WAVE.judgement(
+            number_with_unit(count, digits=3), beyond=count < ELEMENTS_PER_WAVE.value, words=words
         )
     steps = [m.value for m in flat(problem.program) if m.word == "DT" and m.value > 0.0]
     if steps and math.isfinite(critical := summary.critical_time_step):
         ratio = max(steps) / critical
-        level = TrustLevel.WITHIN if ratio < 1.0 else TrustLevel.OUTSIDE
-        yield Judgement(level, "time step", share(ratio), "of the critical one")
+        yield TIME_STEP.judgement(share(ratio), beyond=not ratio < TIME_STEP.value)
     if problem.contact is not None:
         yield _load(problem)
     if summary.equilibrium_change is not None:
         change = summary.equilibrium_change
-        level = TrustLevel.DOUBTFUL if abs(change) > NOTABLE_SHEAR else TrustLevel.WITHIN
-        words = (
-            "change of the static deflection by the shear stiffness from equilibrium (SHEA EQUI), "
-            "which the deck leaves out"
-        )
-        yield Judgement(level, "transverse shear factor 1", share(change), words)
+        yield SHEAR_FACTOR.judgement(share(change), beyond=abs(change) > SHEAR_FACTOR.value)
 
 
 def _load(problem: Problem) -> Judgement:
     """Judge whether the contact force acts on a patch or at a point."""
-    name, patch = "contact force", problem.patch
-    if patch is None:
-        words = "the peak depends on the element under a point force; PATC gives it a size"
-        return Judgement(TrustLevel.DOUBTFUL, name, "at a point", words)
-    ratio = patch.radius / problem.laminate.thickness
-    return Judgement(TrustLevel.WITHIN, name, ShownNumber(ratio, f"on a radius of {ratio:.3g} h"))
+    if problem.patch is None:
+        return POINT_FORCE.judgement("at a point", beyond=True)
+    ratio = problem.patch.radius / problem.laminate.thickness
+    size = ShownNumber(ratio, f"on a radius of {ratio:.3g} h")
+    return POINT_FORCE.judgement(size, beyond=False, words="")
 
 
 def _numerical(result: Result) -> Iterator[Judgement]:
@@ -260,14 +201,11 @@ def _numerical(result: Result) -> Iterator[Judgement]:
     if "energy/balance_error" in result and energy > 0.0:
         error = np.abs(result.whole("energy/balance_error"))
         worst = float(error.max(initial=0.0)) / energy
-        level = TrustLevel.WITHIN if worst < BALANCED else TrustLevel.DOUBTFUL
-        size: Cell = ShownNumber(worst, f"{worst:.2g}")
-        words = "largest error, of the energy put in"
-        yield Judgement(level, "energy balance", size, words)
+        size = ShownNumber(worst, f"{worst:.2g}")
+        yield ENERGY_BALANCE.judgement(size, beyond=not worst < BALANCED)
     count = result.attributes_of("history").get("unsettled_steps")
     if count:
-        words = "the contact iteration did not converge; a smaller DT helps"
-        yield Judgement(TrustLevel.DOUBTFUL, "steps", ShownNumber(float(count), str(count)), words)
+        yield ITERATION.judgement(ShownNumber(float(count), str(count)), beyond=True)
 
 
 def _mode(result: Result) -> Iterator[Judgement]:

@@ -26,9 +26,9 @@ from fecm._text import Decimal, csv_lines
 from fecm._typing import Array
 from fecm.deck.mesh_cards import AXES, DOF_NAMES
 from fecm.deck.units import column_name, units_of_columns
+from fecm.judge.criteria import criteria_of
+from fecm.judge.exposures import LOWER_BOUNDS
 from fecm.results import schema
-from fecm.results.criteria import criteria_of
-from fecm.results.exposures import LOWER_BOUNDS
 from fecm.results.groups import ExportError, NotStoredError, remedy, stored_by, suggestion
 from fecm.results.hdf5_writer import new_hdf5
 from fecm.results.plate_fields import At, Fields, Ints, Note, plate_fields, vtk_cells, vtk_points

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from enum import StrEnum
 from typing import Annotated, Any, NamedTuple, TypedDict, cast
 
 import numpy as np
@@ -13,91 +11,15 @@ import numpy as np
 from fecm._errors import ResultFileError
 from fecm._typing import Array, Floats
 from fecm.deck.material_cards import MATERIAL
-from fecm.results.criteria import (
-    INTERLAMINAR,
-    criteria_of,
-    materials_at,
-    mode_at,
-    plies_in_words,
-    where,
-)
-from fecm.results.exposure_bands import LoadMesh, may_decide_otherwise, mesh_band
+from fecm.judge.criteria import INTERLAMINAR, criteria_of, materials_at, mode_at, where
+from fecm.judge.exposure_bands import LoadMesh, mesh_band
+from fecm.judge.exposures import LargestExposure
 from fecm.results.stored import Stored, computed_once
 
-LOWER_BOUNDS = "the run ends in contact: exposures are lower bounds"
 TIE = 1e-9  # relative difference of equal exposures; see fecm/mechanics/exposures.py
-FEWEST = 20  # evaluations of FAIL during contact below which maxima may be missed
 # Attributes of a criterion's group, with CURE.
 AT_REST = "at_rest"
 LOAD_FACTOR = "load_factor"
-
-
-class LargestExposure(NamedTuple):
-    """Largest exposure of a criterion outside the load and on the circle around it."""
-
-    criterion: str
-    exposure: float
-    mode: str
-    ply: int  # from 1 at the struck face; of an interface the ply above it
-    x: float
-    y: float
-    time: float
-    mirrors: int = 0  # other points that have the same exposure
-    # Lowest and highest exposure that finer meshes may give, (0, inf) where the mesh does not
-    # bound it; None without a load.
-    band: tuple[float, float] | None = None
-    # With CURE; None without it.
-    at_rest: float | None = None  # largest exposure of the residual stresses alone
-    # Factor on all other stresses at the place at which the exposure is 1.
-    load_factor: float | None = None
-    # Names of the material of the ply, or of both plies; empty if the deck has one material.
-    materials: tuple[str, ...] = ()
-
-    @property
-    def plies(self) -> str:
-        """The ply, or the plies of the interface, in words."""
-        return plies_in_words(self.criterion, self.ply, self.materials)
-
-    @property
-    def where(self) -> str:
-        """The ply, or the interface, in words."""
-        return where(self.criterion, self.ply, self.materials)
-
-    @property
-    def is_open(self) -> bool:
-        """Whether finer meshes may decide otherwise whether the exposure reaches 1."""
-        return self.band is not None and may_decide_otherwise(self.exposure, self.band)
-
-
-class FailureVerdict(StrEnum):
-    """Whether an exposure reaches 1, as far as the mesh decides it."""
-
-    REACHED = "reached"
-    NOT_REACHED = "not reached"
-    OPEN = "open"
-
-
-def failure_verdict(largest: Sequence[LargestExposure]) -> FailureVerdict:
-    """Judge whether any of the largest exposures reaches 1 on every, no, or some finer mesh."""
-    if any(exposure.exposure >= 1.0 and not exposure.is_open for exposure in largest):
-        return FailureVerdict.REACHED
-    return (
-        FailureVerdict.OPEN
-        if any(exposure.is_open for exposure in largest)
-        else FailureVerdict.NOT_REACHED
-    )
-
-
-def band_of_largest(largest: Sequence[LargestExposure]) -> tuple[float, float]:
-    """Return the lowest and the highest value that finer meshes may give the largest exposure.
-
-    They are 0 and infinite where the mesh does not bound it. Both are NaN where they are not known.
-    """
-    bands = [exposure.band for exposure in largest if exposure.band is not None]
-    if not bands or len(bands) < len(largest):
-        return math.nan, math.nan
-    low, high = (max(ends) for ends in zip(*bands, strict=True))
-    return low, high
 
 
 @computed_once

@@ -21,8 +21,8 @@ import numpy as np
 from fecm._errors import OptionsError, ResultFileError
 from fecm._text import short_text
 from fecm._typing import AnyFile, Array
+from fecm.judge.criteria import OWN_CRITERIA, criteria_of
 from fecm.results import schema
-from fecm.results.criteria import OWN_CRITERIA, criteria_of
 from fecm.results.exposures import AT_REST, LOAD_FACTOR
 from fecm.results.groups import NotStoredError, not_stored
 from fecm.results.metrics import INITIAL_PLATE, MOBILITY, REST_W, START_W

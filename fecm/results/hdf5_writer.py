@@ -17,8 +17,8 @@ import numpy as np
 from fecm._files import beside
 from fecm._typing import Array
 from fecm.deck.units import declared_units, unit_of, units_of_columns
+from fecm.judge.criteria import criteria_of
 from fecm.results import schema
-from fecm.results.criteria import criteria_of
 from fecm.results.groups import ResultWriteError
 from fecm.results.schema import Dataset, Form
 from fecm.results.sinks import Operation

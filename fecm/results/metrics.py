@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._typing import Bools, Floats
-from fecm.results.criteria import ALL_CRITERIA, spelt
-from fecm.results.end import (
+from fecm.judge.criteria import ALL_CRITERIA, spelt
+from fecm.judge.end import (
     GONE,
     Deflection,
     LastContact,
@@ -194,7 +194,7 @@ class Metrics(NamedTuple):
     """Metrics of cases, and which of them the ends have decided."""
 
     columns: dict[str, Floats]  # (cases,) each; NaN where the end of the case has not decided them
-    end: Texts  # (cases,): state of the contact at the end, :class:`~fecm.results.end.End`
+    end: Texts  # (cases,): state of the contact at the end, :class:`~fecm.judge.end.End`
     # (cases,): largest contact force of the whole plate up to the end, a lower bound of the peak.
     reached: Floats
     last: LastContact
@@ -224,7 +224,7 @@ def impact_metrics(
     :data:`SUMMARY`; with a delamination threshold (force, or (cases,)) also the names of
     :data:`THRESHOLD`. `plate` is the motion of the plate under the load, `mobility` (1/mass) the
     mobility of its rigid motion, and `plate_mass` its mass; see
-    :class:`~fecm.results.validity.Judge`. Values that the end of a case has not decided are NaN.
+    :class:`~fecm.judge.validity.Judge`. Values that the end of a case has not decided are NaN.
     Forces, masses and energies are those of one of `factor` symmetric parts; the threshold, and
     the forces and energies returned, are those of the whole plate. If a case ends in contact or
     within reach of the plate, only the peaks can be decided, and only if they have passed and the

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Array, Floats
+from fecm.judge.criteria import INTERLAMINAR, criteria_of
+from fecm.judge.exposures import LOWER_BOUNDS
 from fecm.mechanics.strains import STRAINS
-from fecm.results.criteria import INTERLAMINAR, criteria_of
-from fecm.results.exposures import LOWER_BOUNDS, near_load
+from fecm.results.exposures import near_load
 from fecm.results.groups import ExportError
 from fecm.results.plies import IN_PLANE
 from fecm.results.plies import INTERLAMINAR as BETWEEN_PLIES

@@ -11,8 +11,8 @@ from fecm._table import html_summary
 from fecm._text import Decimal
 from fecm._typing import AnyFile, Floats
 from fecm.deck.model import Deck
+from fecm.judge.end import End
 from fecm.results import schema
-from fecm.results.end import End
 from fecm.results.groups import GROUPS, NotStoredError, ResultGroup, not_stored
 from fecm.results.metrics import METRICS, MetricAttributes
 from fecm.results.run_metrics import ImpactMetrics, end_of, metrics_of

@@ -13,7 +13,7 @@ from fecm._errors import ResultFileError
 from fecm._table import Row, Table, html_table, text_lines
 from fecm.deck.model import Impact
 from fecm.deck.units import quantity, unit_of
-from fecm.results.end import Deflection, End, RigidMotion, time_to_decide
+from fecm.judge.end import Deflection, End, RigidMotion, time_to_decide
 from fecm.results.groups import NotStoredError, remedy, suggestion
 from fecm.results.metrics import (
     INITIAL_PLATE,

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm._version import __version__
 from fecm.deck.mesh_cards import AXES, DOF_NAMES
-from fecm.results.criteria import ALL_CRITERIA
+from fecm.judge.criteria import ALL_CRITERIA
 from fecm.results.groups import GROUPS, ResultGroup
 from fecm.results.metrics import COLUMNS, RATIO, STATUS, VALIDITY, described
 

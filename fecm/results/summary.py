@@ -14,16 +14,21 @@ from fecm._text import DECK_DIGITS, DIGITS, significant
 from fecm._typing import FiniteFloat, Floats
 from fecm.deck.units import quantity as shown_quantity
 from fecm.deck.units import unit_of
-from fecm.results.criteria import spelt
-from fecm.results.end import End
-from fecm.results.exposure_bands import is_bounded
+from fecm.judge.criteria import spelt
+from fecm.judge.end import ENDS, OPEN_PEAKS, End
+from fecm.judge.exposures import (
+    LargestExposure,
+    finer_meshes,
+    no_failure,
+    on_this_mesh,
+    point_in_words,
+)
+from fecm.judge.limits import EXPOSURE, THRESHOLD
+from fecm.judge.threshold import from_threshold, threshold_outcome
 from fecm.results.exposures import (
     FailureJson,
-    FailureVerdict,
-    LargestExposure,
     evaluations_in_contact,
     failure_metrics,
-    failure_verdict,
     first_failures,
     largest_exposures,
 )
@@ -32,7 +37,6 @@ from fecm.results.metrics import INITIAL_PLATE
 from fecm.results.run_metrics import end_of, impact_energy, metrics_of, start_w_of
 from fecm.results.schema import DATASETS
 from fecm.results.stored import Stored, row_blocks, whole_plate
-from fecm.results.validity import CROSSED, from_threshold
 
 if TYPE_CHECKING:
     from fecm.results.exposures import FirstFailure
@@ -157,18 +161,16 @@ NEAR = 0.05  # distance of a row from the peak, over its time, that counts as th
 LISTED = 6  # most contacts and frequencies listed individually
 # Parts by the caller of the run: attribute, name, and the segment of the deck that they replace.
 OWN_PARTS = (("law", "contact law", "EXPE"), ("projectile", "projectile", "PROJ"))
-# State at the end of a run that has not decided its peak.
-UNDECIDED = {
-    End.RISING: "in contact",
-    End.BETWEEN: "between two contacts",
-    End.AGAIN: "before the plate is out of reach of the projectile",
-}
+
+# Events whose impact energy a search finds, with the search's condition.
+THRESHOLD_EVENT = ("the threshold", "peak_force=threshold")
+FAILURE_EVENT = ("the first failure", "exposure=1")
 
 
-def _search(what: str, until: str) -> Row:
-    """Return the row with the command that finds the impact energy of an event."""
+def search_for(event: str, until: str) -> str:
+    """Return the command that finds the impact energy of an event."""
     command = f"fecm sweep DECK --find velocity --until {until}"
-    return ("", f"{command} finds the impact energy of {what}")
+    return f"{command} finds the impact energy of {event}"
 
 
 def run_summary(result: Stored) -> list[str]:
@@ -206,9 +208,9 @@ def _run_rows(result: Stored) -> list[Row]:
     if text := _membrane(result):
         lines.append(("membrane", text))
     if result.threshold:
-        lines.append(("delamination", f"{_delamination(result)}{_delaminations(result)}"))
+        lines.append(("delamination", _delamination(result)))
         if math.isfinite(float(result.threshold["time"])):
-            lines.append(_search("the threshold", "peak_force=threshold"))
+            lines.append(("", search_for(*THRESHOLD_EVENT)))
     if "failure/x" in result:
         lines += _exposures(result)
     if "modes/angular_frequency" in result:
@@ -286,22 +288,23 @@ def _membrane(result: Stored) -> str:
     return f"{percent:.{0 if percent > 9.5 else 1}f} % of the strain energy {when}"
 
 
-def _delaminations(result: Stored) -> str:
-    """Say how many delaminations the threshold assumes, and the forces for other numbers."""
+def _delamination(result: Stored) -> str:
+    """Format the threshold, whether it is reached, and the forces for other delaminations."""
+    verdict = f"{threshold_force(result)}, {threshold_verdict(result)}"
     threshold = result.threshold
     band, number, interfaces = (
         np.asarray(threshold.get(name, "")) for name in ("band", "number", "interfaces")
     )
     kinds = [(array.dtype.kind, array.shape) for array in (band, number, interfaces)]
     if kinds != [("f", (2,)), ("i", ()), ("i", ())]:
-        return ""  # a result of an older version
+        return verdict  # of an older version
     least, most = (_quantity(result, force, "force") for force in band.tolist())
     other_counts = {1: most, max(1, int(interfaces)): least}
     other_counts.pop(int(number), None)
     count = "one delamination" if number == 1 else f"{number} delaminations"
     texts = [f"{force} for {'one' if n == 1 else n}" for n, force in other_counts.items()]
     texts += lowest_criterion(result)
-    return f" ({'; '.join([f'for {count}, as in DELA', *texts])})"
+    return f"{verdict} ({'; '.join([f'for {count}, as in DELA', *texts])})"
 
 
 def lowest_criterion(result: Stored) -> list[str]:
@@ -329,16 +332,13 @@ def _exposures(result: Stored) -> list[Row]:
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:
         lines.append(("evaluations", f"{count} of FAIL during contact"))
-    is_open = "open, as finer meshes may decide otherwise; on this mesh "
-    is_open = is_open if failure_verdict(largest) is FailureVerdict.OPEN else ""
     if first:
-        lines.append(("first failure", f"{is_open}{_first_failure(result, first[0])}"))
+        text = f"{on_this_mesh(largest)}{_first_failure(result, first[0])}"
+        lines.append(("first failure", text))
         if not math.isnan(first[0].force):
-            lines.append(_search("the first failure", "exposure=1"))
+            lines.append(("", search_for(*FAILURE_EVENT)))
     elif largest and count:
-        ends = " by the end of the run, which is in contact: open"
-        ends = ends if result.still_in_contact else ""
-        lines.append(("first failure", f"{is_open}none{ends}"))
+        lines.append(("first failure", no_failure(largest, end_of(result))))
     if left_out := np.count_nonzero(result["failure/under_load"]) * result.symmetry_factor:
         lines.append(("left out", f"{left_out} points under the load or at corners of supports"))
     return lines
@@ -355,8 +355,7 @@ def _first_failure(result: Stored, first: FirstFailure) -> str:
     """Format the first failure: mode, place, time, and force and energy of an impact."""
     quantity = partial(_quantity, result)
     texts = [
-        f"{first.mode} ({spelt(first.criterion)})",
-        f"{first.where} at ({significant(first.x)}, {significant(first.y)})",
+        point_in_words(first),
         f"time {quantity(first.time, 'time')}, "
         f"between {significant(first.earliest)} and {significant(first.latest)}",
     ]
@@ -368,7 +367,7 @@ def _first_failure(result: Stored, first: FirstFailure) -> str:
 
 def _exposure(result: Stored, largest: LargestExposure) -> str:
     """Format the largest exposure of a criterion with its place and time."""
-    least = "at least " if end_of(result) in UNDECIDED else ""
+    least = "at least " if end_of(result) in OPEN_PEAKS else ""
     return (
         f"{least}{largest.exposure:.4g}: {largest.mode}, "
         f"{largest.where} at ({significant(largest.x)}, {significant(largest.y)}), "
@@ -388,13 +387,7 @@ def _mirrors(result: Stored, largest: LargestExposure) -> str:
 
 def _band(largest: LargestExposure) -> str:
     """Format the exposures that finer meshes may give."""
-    if largest.band is None:
-        return ""
-    if not is_bounded(largest.band):
-        return "; finer meshes not bounded"
-    low, high = largest.band
-    above = f"to {high:.3g}" if math.isfinite(high) else "or more"
-    return f"; finer meshes {low:.3g} {above}"
+    return "" if largest.band is None else f"; {finer_meshes(largest.band, '{:.3g}'.format)}"
 
 
 def _at_rest(largest: LargestExposure) -> str:
@@ -407,20 +400,19 @@ def _at_rest(largest: LargestExposure) -> str:
     return f"{text}, 1 at {largest.load_factor:.4g} of the load's stresses"
 
 
-def _delamination(result: Stored) -> str:
-    """Format the threshold of delamination, and whether it is reached."""
+def threshold_force(result: Stored) -> str:
+    """Return the threshold of delamination, and from which number of delaminations it is."""
     threshold = result.threshold
-    force, crossing = (
-        _quantity(result, float(threshold["force"]), "force"),
-        float(threshold["time"]),
-    )
-    force = f"{from_threshold(threshold.get('number'))} {force}"
-    if math.isfinite(crossing):
-        return f"{force}, reached at time {_quantity(result, crossing, 'time')}"
-    if (end := end_of(result)) in UNDECIDED:
-        return f"{force}, not reached by the end of the run, which is {UNDECIDED[end]}: open"
+    force = _quantity(result, float(threshold["force"]), "force")
+    return f"{from_threshold(threshold.get('number'))} {force}"
+
+
+def threshold_verdict(result: Stored) -> str:
+    """Say whether the threshold of delamination is reached."""
+    time = float(result.threshold["time"])
+    reached = f"at time {_quantity(result, time, 'time')}" if math.isfinite(time) else ""
     margin = metrics_of(result).get("threshold_margin", 1.0)
-    return f"{force}, not reached: the peak is {margin:.1%} below"
+    return threshold_outcome(reached, end_of(result), margin)
 
 
 def _quantity(result: Stored, value: float, dimension: str, digits: int = DIGITS) -> str:
@@ -462,8 +454,8 @@ def _peak_force(result: Stored) -> str:
     if force[peak] > 0.0:
         when = _quantity(result, time[peak], "time")
         text = f"{_quantity(result, force[peak], 'force')} at time {when} (step {peak + 1})"
-        if (end := end_of(result)) in UNDECIDED:
-            text = f"at least {text}, as the run ends {UNDECIDED[end]}"
+        if (end := end_of(result)) in OPEN_PEAKS:
+            text = f"at least {text}, as the run ends {ENDS[end].brief}"
         text += later_contact(result)
     doubt = elastic_doubt(result, float(force[peak]))
     return f"{text} ({doubt})" if doubt else text
@@ -552,11 +544,9 @@ def _energy_balance(result: Stored) -> str:
 def elastic_doubt(result: Stored, peak: float) -> str:
     """Say why a peak force is only an elastic prediction; empty if it may be real."""
     beyond = []
-    if result.threshold and peak > CROSSED * (force := float(result.threshold["force"])):
-        words = from_threshold(result.threshold.get("number"))
-        limit = _quantity(result, force, "force")
-        beyond.append(f"delamination is expected {words} {limit}")
-    if any(exposure.exposure > CROSSED for exposure in largest_exposures(result)):
+    if result.threshold and peak > THRESHOLD.value * float(result.threshold["force"]):
+        beyond.append(f"delamination is expected {threshold_force(result)}")
+    if any(exposure.exposure > EXPOSURE.value for exposure in largest_exposures(result)):
         beyond.append("the first ply fails before")
     return f"elastic prediction; {', and '.join(beyond)}" if beyond else ""
 

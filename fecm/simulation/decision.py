@@ -10,9 +10,10 @@ import numpy as np
 
 from fecm._typing import Array, Floats
 from fecm.deck.units import unit_names
+from fecm.judge.end import RINGING, End
+from fecm.judge.limits import LATE_VALUE
 from fecm.mechanics.failure import MODES
 from fecm.problem.problem import Problem
-from fecm.results.end import LATE, RINGING, End
 from fecm.results.metrics import FACTOR, INITIAL_PLATE, MOBILITY, PLATE_MASS, REST_W, START_W
 from fecm.results.result import Result
 from fecm.results.run_metrics import end_of, steps_to_decide
@@ -85,7 +86,7 @@ def steps_to_come(simulation: Simulation) -> int:
     if simulation.problem.judge.mobility:
         return 0
     time, dt = result["history/time"], state.dt
-    waiting = risen_at(result["history/plate_w"], time) / LATE - time[-1]
+    waiting = risen_at(result["history/plate_w"], time) / LATE_VALUE.value - time[-1]
     return max(least, math.ceil(waiting / dt)) if waiting > 0.0 else 0
 
 

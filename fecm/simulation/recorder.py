@@ -13,12 +13,12 @@ import numpy as np
 
 from fecm._typing import Array, Floats
 from fecm.deck.macros import WorkEstimate
+from fecm.judge.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA
 from fecm.mechanics.failure import CRITERIA
 from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.plate_motion import DofSums, PlateState
 from fecm.mechanics.strains import STRAINS, midplane_height
 from fecm.problem.build import ImpactModel
-from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA
 from fecm.results.exposures import LOAD_FACTOR
 from fecm.results.groups import GROUPS
 from fecm.results.metrics import INITIAL_PLATE

@@ -23,9 +23,9 @@ from fecm.results.metrics import VALIDITY
 from fecm.results.result import Result
 from fecm.results.schema import KINEMATICS, Form, Kinematics, heading
 from fecm.results.sinks import ReadOnce, Sink
-from fecm.simulation.decision import history_attributes, symmetry_attributes, undoubted
-from fecm.simulation.judge import judge_run
+from fecm.simulation.decision import history_attributes, symmetry_attributes
 from fecm.simulation.macros import STORING, bind, bind_loop
+from fecm.simulation.notes import judge_run
 from fecm.simulation.simulation import Observer, Simulation
 from fecm.simulation.state import cause_of_divergence
 
@@ -142,19 +142,22 @@ def _write_footer(simulation: Simulation) -> Result:
     history = history_attributes(simulation)
     if history:
         sink.attributes("history", history)
-    datasets = ReadOnce(sink)
-    result = undoubted(simulation, datasets)
-    if (threshold := simulation.problem.threshold) is not None:
+    threshold = simulation.problem.threshold
+    if threshold is not None:  # which the metrics need
+        sink.attributes("threshold", {"force": threshold.force})
+    result = Result(ReadOnce(sink), sink.texts, sink.groups, simulation.problem.deck)
+    if threshold is not None:
         crossing = simulation.state.monitor.crossing
         sink.attributes("threshold", _threshold_attributes(threshold, crossing, result))
     if simulation.state.failure is not None:
         sink.attributes("failure", {"evaluations_in_contact": count_evaluations(result)})
     verdict = judge_run(simulation, result)
-    if verdict.validity:
-        sink.attributes("", {VALIDITY: verdict.validity})
-    if verdict.notes:
-        sink.attributes("", {"notes": verdict.notes})
-    return Result(datasets, sink.texts, sink.groups, simulation.problem.deck)
+    said: dict[str, Any] = {VALIDITY: verdict.validity, "notes": verdict.notes}
+    for name, value in said.items():
+        if value:
+            sink.attributes("", {name: value})
+            result.attributes[name] = value
+    return result
 
 
 def _threshold_attributes(threshold: Threshold, crossing: float, result: Result) -> dict[str, Any]:

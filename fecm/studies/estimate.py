@@ -24,7 +24,6 @@ from fecm.mechanics.quick_models import (
 from fecm.mechanics.roots import root
 from fecm.problem.estimates import NoCurveError, nonlinear_curve, whole_stiffness
 from fecm.problem.problem import Problem
-from fecm.results.validity import LIMITS
 
 # Mass of the projectile over the mass of the plate.
 SMALL = 0.1  # ratio below which waves control the impact
@@ -98,7 +97,7 @@ def quick_estimate(problem: Problem) -> QuickEstimate:
     models.append(static)
     remark = ""
     if problem.plate.nonlinear:
-        limit = LIMITS[problem.judge.in_plane] * laminate.thickness
+        limit = problem.judge.deflection.value * laminate.thickness
         if static.impact.peak > limit * stiffness:
             models[-1] = replace(static, applies=False)
         try:

@@ -19,6 +19,7 @@ from fecm._typing import Floats
 from fecm.authoring.time_values import lengthened
 from fecm.deck.macros import flat
 from fecm.deck.model import Nonlinear
+from fecm.judge.limits import ENERGY_BALANCE
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import HystereticLaw, Law
 from fecm.mechanics.own_law import CaseByCase
@@ -26,7 +27,6 @@ from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_model
 from fecm.problem.problem import Problem
 from fecm.results.metrics import GAGE, Projectiles, impact_metrics
-from fecm.simulation.judge import ENERGY_WARNING
 from fecm.sweeps.checks import ADVANCED_BYTES
 from fecm.sweeps.impact_columns import Impacts
 from fecm.sweeps.in_full import (
@@ -192,7 +192,7 @@ class PlateResponse(NamedTuple):
     response: Floats
     dt: float
     node_mass: float
-    mobility: float  # of the rigid motion, see :class:`~fecm.results.validity.Judge`
+    mobility: float  # of the rigid motion, see :class:`~fecm.judge.validity.Judge`
     strains: dict[str, Floats]  # response of every gage that is measured, by the name of its column
 
     @property
@@ -293,7 +293,7 @@ def _outcome_together(
     judge_cases(outcome, checked, measures, metrics, peaks=peaks, indentation=largest)
     outcome = outcome.select(ordered.back)
 
-    settled = (struck.error < ENERGY_WARNING) & (struck.unconverged_steps == 0)
+    settled = (struck.error < ENERGY_BALANCE.value) & (struck.unconverged_steps == 0)
     doubtful = ~settled[ordered.back]
     if not (judged and doubtful.any()):
         return outcome

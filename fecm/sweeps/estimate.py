@@ -10,11 +10,13 @@ from fecm._errors import warn
 from fecm._table import Row, Table, html_table, text_lines
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
+from fecm.judge.limits import TOO_SOFT
+from fecm.judge.threshold import AT_THE_LATEST, from_threshold
+from fecm.judge.validity import Judge, unsafe
 from fecm.problem.loading import sole_problem
 from fecm.problem.problem import Problem
 from fecm.results.metrics import RATIO
 from fecm.results.stored import whole_plate
-from fecm.results.validity import AT_THE_LATEST, TOO_SOFT, Judge, from_threshold, unsafe
 from fecm.studies.estimate import INFINITE_PLATE, LARGE, SMALL, QuickEstimate
 from fecm.studies.estimate import quick_estimate as by_quick_models
 from fecm.sweeps.execute import carry_out_plan
@@ -207,7 +209,8 @@ def estimate_problem(problem: Problem) -> Estimate:
         bent = [*_bent_statically(quick, problem.judge), *bent]
     if bent:
         bent = [
-            f"beyond {problem.judge.limit} h, {TOO_SOFT}; {unsafe(curved=problem.judge.curved)}",
+            f"beyond {problem.judge.deflection.shown}, {TOO_SOFT}; "
+            f"{unsafe(curved=problem.judge.curved)}",
             *bent,
         ]
     remarks: dict[str, str] = {}
@@ -294,7 +297,7 @@ def _bent_statically(quick: QuickEstimate, judge: Judge) -> list[str]:
 
 def _bent(where: str, deflection: float, judge: Judge) -> list[str]:
     """Return a note about a deflection beyond the linear plate. A free plate has none (NaN)."""
-    ratio = deflection / judge.thickness
-    if not ratio > judge.limit:
+    if not deflection > judge.largest(judge.deflection):
         return []
+    ratio = deflection / judge.thickness
     return [f"{where} deflects by {ratio:.3g} h: {judge.softness(ratio)}"]

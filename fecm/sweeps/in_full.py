@@ -16,6 +16,10 @@ from fecm.authoring.values import apply_case, name_fault
 from fecm.deck.macros import Body, Loop
 from fecm.deck.model import Deck, Macro
 from fecm.deck.units import unit_names
+from fecm.judge.end import decided
+from fecm.judge.exposures import band_of_largest
+from fecm.judge.limits import EXPOSURE, INDENTATION, THRESHOLD
+from fecm.judge.validity import Extent, reasons_of
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.laminate import threshold_force
 from fecm.mechanics.own_law import LawError
@@ -24,8 +28,7 @@ from fecm.problem.build import RunOptions
 from fecm.problem.loading import LoadedDeck, load_deck
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
-from fecm.results.end import decided
-from fecm.results.exposures import band_of_largest, count_evaluations, largest_exposures
+from fecm.results.exposures import count_evaluations, largest_exposures
 from fecm.results.metrics import (
     BAND,
     EVALUATIONS,
@@ -43,7 +46,6 @@ from fecm.results.metrics import (
 from fecm.results.result import Result
 from fecm.results.run_metrics import deflection_of
 from fecm.results.sinks import MemorySink, Sink
-from fecm.results.validity import Extent, reasons_of
 from fecm.simulation.recorder import exposures_of
 from fecm.simulation.run import run_program
 from fecm.simulation.simulation import Criteria, Observer, Simulation
@@ -94,10 +96,12 @@ def judge_cases(
     exposures = [peak.largest for name, peak in peaks.items() if name in EXPOSURES]
     extent = Extent(
         end=end,
-        peak=outcome.columns[About.REACHED],
-        indentation=indentation,
-        deflection=deflection,
-        exposure=np.nanmax(exposures, axis=0) if exposures else np.nan,
+        largest={
+            rules.deflection: deflection,
+            INDENTATION: indentation,
+            EXPOSURE: np.nanmax(exposures, axis=0) if exposures else np.nan,
+            THRESHOLD: outcome.columns[About.REACHED],
+        },
         threshold=metrics.columns.get(THRESHOLD_FORCE, np.nan),
         of_rows=of_rows,
     )

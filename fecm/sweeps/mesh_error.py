@@ -12,6 +12,7 @@ from fecm.authoring.case import CasesError, check_deck
 from fecm.authoring.time_values import stable_time_step, with_time_step
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck
+from fecm.judge.end import OPEN_PEAKS
 from fecm.listing.slips import Mode, active_slips
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import RunOptions
@@ -20,7 +21,6 @@ from fecm.problem.loading import load_one
 from fecm.problem.memory import check_run_memory
 from fecm.problem.problem import Problem
 from fecm.problem.refine import RefineError, refined_deck
-from fecm.results.end import OPEN_PEAKS
 from fecm.results.exposures import largest_exposures
 from fecm.results.run_metrics import end_of
 from fecm.results.sinks import MemorySink

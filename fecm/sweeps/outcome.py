@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
+from fecm.judge.validity import FAILED, VALID
 from fecm.results.metrics import COLUMNS, SUMMARY, Metrics
-from fecm.results.validity import FAILED, VALID
 from fecm.sweeps.impact_columns import Impacts
 
 Column = NDArray[Any]  # of numbers or of texts

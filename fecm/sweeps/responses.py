@@ -20,6 +20,7 @@ from numpy.fft import irfft, rfft
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
+from fecm.judge.end import LEAST_WORK, Deflection
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import (
     ContactParameters,
@@ -34,7 +35,6 @@ from fecm.mechanics.impact_sweep import Given, ResultRow, sweep_impacts
 from fecm.mechanics.plate_motion import AppliedForce, DofSums, Load, PlateMotion
 from fecm.mechanics.projectile import Projectile, RigidMass, RodIntegrator, RodState, WilsonStep
 from fecm.mechanics.rod_modes import ProjectileModes
-from fecm.results.end import LEAST_WORK, Deflection
 from fecm.results.metrics import IndentationMetrics
 
 # Steps of the blocks.  A force acts at once on the rest of the smallest block, which acts on the

@@ -14,7 +14,7 @@ from fecm._typing import Bools, Floats
 from fecm.authoring.case import NO_THRESHOLD, CasesError
 from fecm.deck.macros import EXTENDED
 from fecm.deck.model import Deck, Delamination, Impact
-from fecm.results.exposures import FEWEST
+from fecm.judge.limits import FAIL_EVALUATIONS
 from fecm.results.metrics import BAND, EVALUATIONS, EXPOSURES, FOUND_BAND
 from fecm.sweeps.impact_columns import Impacts
 from fecm.sweeps.limits import PEAK_FORCE, THRESHOLD, level_of, parse_exceed
@@ -344,8 +344,9 @@ def largest_exposure(outcome: Outcome) -> float:
     if values and np.isnan(values).any():
         return math.nan
     (counted,) = EVALUATIONS
-    if (count := int(outcome.columns[counted][0])) < FEWEST or not values:
-        raise CasesError(f"FAIL was evaluated {count} times during contact, less than {FEWEST}")
+    if (count := int(outcome.columns[counted][0])) < FAIL_EVALUATIONS.value or not values:
+        least = FAIL_EVALUATIONS.shown
+        raise CasesError(f"FAIL was evaluated {count} times during contact, less than {least}")
     return max(values)
 
 

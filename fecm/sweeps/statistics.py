@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from fecm._arrays import compared_by_identity
 from fecm._typing import Bools, Floats
+from fecm.judge.end import MAY_TOUCH, PEAK_NOT_REACHED
 from fecm.results.metrics import THRESHOLD_FORCE, VALIDITY, VERDICTS
-from fecm.results.validity import Reason
 from fecm.sweeps.limits import THRESHOLD, Limit, check_limits
 from fecm.sweeps.outcome import Column, Status, was_run
 from fecm.sweeps.random import REMEDY, Design
@@ -284,7 +284,9 @@ def _notes(design: Design, columns: Columns, fine: Bools) -> Iterator[str]:
 def open_cases(summary: Columns) -> Bools:
     """Return a mask of the cases that ended before their contact was over, with open values."""
     validity = summary.get(VALIDITY, summary["status"])
-    open_peaks = [np.char.find(validity, reason) >= 0 for reason in (Reason.OPEN, Reason.AGAIN)]
+    open_peaks = [
+        np.char.find(validity, doubt.reason) >= 0 for doubt in (PEAK_NOT_REACHED, MAY_TOUCH)
+    ]
     return np.asarray((summary["status"] == Status.STILL) | np.any(open_peaks, axis=0))
 
 

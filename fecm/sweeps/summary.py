@@ -15,23 +15,14 @@ from fecm._typing import Bools
 from fecm.authoring.case import pair_of_text
 from fecm.deck.model import Curvature, Delamination, Preload, Segment
 from fecm.deck.units import column_name, quantity
+from fecm.judge.exposures import finer_meshes
+from fecm.judge.limits import FREE_DEFLECTION, TOO_SOFT
+from fecm.judge.threshold import AT_THE_LATEST, from_threshold
+from fecm.judge.validity import BENT, InPlane, counted, in_plane_of, softness, unsafe
 from fecm.problem.generate import generate
 from fecm.problem.symmetry import symmetry_of
-from fecm.results.exposure_bands import is_bounded
 from fecm.results.metrics import FACTOR, FOUND_BAND, RATIO, THRESHOLD_FORCE
 from fecm.results.stored import whole_plate
-from fecm.results.validity import (
-    AT_THE_LATEST,
-    BENT,
-    MEANING,
-    TOO_SOFT,
-    InPlane,
-    counted,
-    from_threshold,
-    in_plane_of,
-    softness,
-    unsafe,
-)
 from fecm.sweeps.limits import THRESHOLD
 from fecm.sweeps.outcome import Column
 from fecm.sweeps.random import pairs_of
@@ -109,10 +100,8 @@ def _found_band(result: StoredSweep, case: int) -> str:
     low, high = (float(result[name][case]) for name in FOUND_BAND)
     if math.isnan(low) or math.isnan(high):
         return ""
-    if not is_bounded((low, high)):
-        return "; finer meshes not bounded"
     unit = result.unit("found_energy")
-    return f"; finer meshes {quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
+    return f"; {finer_meshes((low, high), lambda energy: quantity(energy, unit, 3))}"
 
 
 def from_threshold_of(result: StoredSweep) -> str:
@@ -195,9 +184,9 @@ def doubtful_counts(result: StoredSweep) -> list[tuple[int, str]]:
 def _doubts(result: StoredSweep) -> dict[str, Bools]:
     """Count the cases beyond the range of the model, by kind."""
     masks = {}
-    for reason, mask in counted(result.validity):
-        what = MEANING[reason]
-        if reason in BENT.values():
+    for doubt, mask in counted(result.validity):
+        what = doubt.case
+        if doubt in BENT:
             ratio = result.summary.get(RATIO, np.full(len(mask), np.nan))[mask]
             if np.isfinite(ratio).any():
                 what = f"{what[:-1]}, up to {np.nanmax(ratio):.3g} h)"
@@ -220,9 +209,9 @@ def remarks(result: StoredSweep) -> Iterator[str]:
             f"find less than {WIDE:g} of it; refine the mesh at "
             "the load, and place a corner of elements there (fecm new --grading)"
         )
-    bent = [reason for reason, _ in counted(result.validity) if reason in BENT.values()]
+    bent = [doubt for doubt, _ in counted(result.validity) if doubt in BENT]
     if bent:
-        held = any(reason != BENT[InPlane.FREE] for reason in bent)
+        held = any(doubt != FREE_DEFLECTION.doubt for doubt in bent)
         ratio = result.summary.get(RATIO, np.full(1, np.nan))
         size = ""
         if np.isfinite(ratio).any():

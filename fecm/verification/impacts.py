@@ -12,6 +12,7 @@ from fecm._typing import Floats
 from fecm.deck import model
 from fecm.deck.grid import ElementGrid, refined_sections, uniform_section
 from fecm.deck.model import Deck, Impact, Indentation, Patch, Projectile
+from fecm.judge.end import Deflection, LastContact, decided, ends, peak_known
 from fecm.mechanics.laminate import effective_rigidity, laminate
 from fecm.mechanics.quick_models import inelasticity, infinite_plate, static_peak
 from fecm.mechanics.solutions import static_stiffness
@@ -19,7 +20,6 @@ from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
 from fecm.problem.loading import load_deck, sole_problem
 from fecm.problem.parts import build_plate
-from fecm.results.end import Deflection, LastContact, decided, ends, peak_known
 from fecm.results.result import Result
 from fecm.results.run_metrics import start_w_of
 from fecm.sweeps.execute import carry_out_plan

@@ -12,10 +12,10 @@ from fecm.deck.macros import flat
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.rules import Report, Reports, Subject, reports, rule
 from fecm.deck.units import quantity, unit_names, unit_of
+from fecm.judge.criteria import exposed
 from fecm.problem.problem import Problem
 from fecm.problem.rules.damage import FIBROUS
 from fecm.problem.rules.zones import material_numbers
-from fecm.results.criteria import exposed
 
 LARGEST_BETA = 0.1  # strain per per cent of weight
 LARGEST_CHANGE = 500.0  # K
@@ -155,7 +155,7 @@ def cracks_at_rest(problem: Problem, card: model.Cure) -> Reports:
         where = exposed(problem.deck, laminate, exposure)
         message = (
             f"The laminate cracks before any load: the residual stresses of CURE reach exposure "
-            f"{exposure.exposure:.3g} ({where})."
+            f"{exposure.exposure:.3g}: {where}."
         )
         hint = (
             f"the change of temperature is {card.delta_t:g} K, both temperatures in one unit; "

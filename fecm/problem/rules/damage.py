@@ -11,13 +11,13 @@ from fecm.deck import model
 from fecm.deck.macros import Loop, every, flat
 from fecm.deck.rules import Report, Reports, Subject, reports, rule
 from fecm.deck.units import MODULUS, TOUGHNESS, in_si, unit_names
+from fecm.judge.criteria import exposed
 from fecm.mechanics.failure import puck_slope
 from fecm.mechanics.laminate import is_fabric
 from fecm.problem.parts import ply_strengths
 from fecm.problem.problem import Problem
 from fecm.problem.rules.units import USED, has_real_moduli, likely_unit, looks_like, needed_unit
 from fecm.problem.rules.zones import material_numbers, unknown_material
-from fecm.results.criteria import exposed
 
 # Strengths over the modulus of their direction.  Annealed glass has 1e-4, soft matrices 0.1.
 WEAKEST = 5e-5
@@ -372,7 +372,7 @@ def preload_beyond_strength(problem: Problem, card: model.Preload) -> Reports:
     if worst is not None and worst[0].exposure >= 1.0:
         exposure, laminate = worst
         where = exposed(problem.deck, laminate, exposure)
-        message = f"The preload alone reaches exposure {exposure.exposure:.3g} ({where})."
+        message = f"The preload alone reaches exposure {exposure.exposure:.3g}: {where}."
         yield Report(message, card.place(), "PREL is a force per length, tension positive")
 
 

@@ -7,9 +7,10 @@ import math
 from fecm._typing import Bools
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.judge.limits import ELEMENTS_PER_WAVE
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.mesh import distinct, extent
-from fecm.problem.estimates import ENOUGH_PER_WAVE, format_mesh_error, resolution
+from fecm.problem.estimates import format_mesh_error, resolution
 from fecm.problem.problem import Problem
 
 W_DOF = W + 1  # number of w on the card
@@ -152,7 +153,7 @@ def coarse_mesh(problem: Problem) -> Reports:
     Remedy: A finer mesh there: see [checking a deck](making.md#checking).
     """
     waves = resolution(problem)
-    if waves is None or waves.elements >= ENOUGH_PER_WAVE:
+    if waves is None or waves.elements >= ELEMENTS_PER_WAVE.value:
         return
     coarse = waves.elements < LEAST_PER_WAVE
     if not coarse and (waves.error is None or waves.error < WORTH_SAYING):
@@ -161,9 +162,8 @@ def coarse_mesh(problem: Problem) -> Reports:
     what = f"The mesh is {'too coarse' if coarse else 'coarse'} at the impact node"
     sides = f"{waves.elements:.1f} elements of side {waves.side:.3g}"
     wave = f"bending wave of the contact's duration, which is {waves.wave:.3g} long"
-    hint = (
-        f"use {ENOUGH_PER_WAVE} elements per wave: sides up to {waves.wave / ENOUGH_PER_WAVE:.2g}"
-    )
+    enough = ELEMENTS_PER_WAVE.value
+    hint = f"use {enough:g} elements per wave: sides up to {waves.wave / enough:.2g}"
     place = problem.deck.require(model.Impact).place("impact node")
     yield Report(f"{what}: {sides} per {wave}{about}.", place, hint)
 

@@ -11,6 +11,7 @@ from fecm.deck import model
 from fecm.deck.macros import flat
 from fecm.deck.rules import Report, Reports, Subject, reports, rule
 from fecm.deck.units import in_si, unit_names
+from fecm.judge.exposure_bands import RESOLVED
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.mesh import MeshArrays, longest_sides
 from fecm.mechanics.points import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError
@@ -18,7 +19,6 @@ from fecm.problem.contact_estimates import expected_peak
 from fecm.problem.problem import ContactPatch, Problem
 from fecm.problem.rules.contact import sphere_radius
 from fecm.problem.rules.units import looks_like
-from fecm.results.exposure_bands import RESOLVED
 
 LARGE = 2.0  # radius of a patch over the thickness, and over the radius of the contact
 INDENTER = 0.5  # radius of a patch over that of a sphere with the deck's k

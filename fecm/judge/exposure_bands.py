@@ -13,12 +13,12 @@ test. docs/confidence.md has both sets, and benchmarks/exposure_bands.py compute
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fecm.results.criteria import INTERLAMINAR
+from fecm.judge.criteria import INTERLAMINAR
 
 RESOLVED = 2.6  # coarseness up to which the mesh resolves the load
 
@@ -190,3 +190,31 @@ def may_decide_otherwise(exposure: float, band: tuple[float, float]) -> bool:
     """
     low, high = band if is_bounded(band) else (exposure / FAR_FROM_1, exposure * FAR_FROM_1)
     return low < 1.0 <= high
+
+
+def coarse_mesh_note(mesh: LoadMesh, shown: Callable[[float], str]) -> str:
+    """Say why finer meshes may change the exposures at the load much; `shown` formats a length/R.
+
+    Examples
+    --------
+    >>> coarse_mesh_note(LoadMesh(1.0, True, False, 30.0, 1.1), "{:.3g} R".format)
+    'exposures at the load are not bounded: the elements there do not have nine nodes; compare \
+them with those of a finer mesh (fecm check --mesh-error)'
+    """
+    band = "have a wide band" if mesh.is_measured else "are not bounded"
+    compare = "compare them with those of a finer mesh (fecm check --mesh-error)"
+    radius = shown(1.0)
+    if not mesh.nine_nodes:
+        why = f"the elements there do not have nine nodes; {compare}"
+    elif mesh.bending_reach < LEAST_REACH:
+        why = (
+            f"the load bends the plate over {shown(mesh.bending_reach)}, and c + h/2 is {radius}: "
+            f"the plate is too thick for a band; {compare}"
+        )
+    else:
+        where = "" if mesh.at_corner else ", and place a corner of elements at the load"
+        why = (
+            f"the elements there have sides of {shown(mesh.coarseness)}, and c + h/2 is {radius}; "
+            f"refine the mesh at the load to sides of {shown(mesh.resolved)}{where}"
+        )
+    return f"exposures at the load {band}: {why}"

@@ -1,13 +1,12 @@
-"""Judge of results: limits of the model, and reasons to doubt a case.
+"""Judge of the impacts on a plate: the error of a linear plate, and reasons to doubt a case.
 
-Runs, cases of sweeps, searches, estimates and pictures all ask this module. Its functions take many
-cases at once: arrays (cases,).
+Functions of cases take many at once: arrays (cases,).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import compress
@@ -16,27 +15,25 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._typing import Array, Bools, Floats
-from fecm.results.end import End, Texts
+from fecm.judge.end import ENDS, Texts
+from fecm.judge.limits import (
+    FREE_DEFLECTION,
+    HELD_DEFLECTION,
+    INDENTATION,
+    LIMITS,
+    THRESHOLD,
+    Doubt,
+    ModelLimit,
+    TrustLevel,
+)
 
-TOO_SOFT = "a linear plate, without membrane stiffening, is too soft"
 # The errors hold for plates without preload.
 PRELOADED = "compressive preload increases this error, tensile preload reduces it"
-REMEDY = "NONL includes the stiffening (fecm new --nonlinear)"
-# Start of a threshold of one delamination: more delaminations, and bending cracks, come before.
-AT_THE_LATEST = "at the latest from"
 UNSAFE = "threshold energies are therefore too high (unsafe)"
 CURVED = (
     "these figures are for a flat plate: a curved panel that is struck on its convex side softens "
     "and may snap through"
 )
-
-
-def from_threshold(delaminations: object) -> str:
-    """Return the words before the threshold force, or energy, of a number of delaminations.
-
-    The number comes from a file and may be damaged.
-    """
-    return AT_THE_LATEST if np.array_equal(np.asarray(delaminations), 1) else "from"
 
 
 class InPlane(StrEnum):
@@ -53,13 +50,14 @@ IN_PLANE_WORDS = {
     InPlane.FREE: "edges free in the plane",
     InPlane.WINDOW: "on a window on which the plate slides",
 }
-# Deflection over the thickness up to which the plate is taken as linear.
-LIMITS = {
-    InPlane.HELD: 0.3,
-    InPlane.FREE: 0.5,
-    InPlane.WINDOW: 0.3,
-    InPlane.UNKNOWN: 0.3,
+# ModelLimit of the deflection over the thickness up to which the plate is taken as linear.
+DEFLECTION = {
+    InPlane.HELD: HELD_DEFLECTION,
+    InPlane.FREE: FREE_DEFLECTION,
+    InPlane.WINDOW: HELD_DEFLECTION,
+    InPlane.UNKNOWN: HELD_DEFLECTION,
 }
+BENT = tuple({limit.doubt for limit in DEFLECTION.values()})  # of cases beyond one of them
 # Least and largest error of the peak force, in percent, at deflections of the linear plate over the
 # thickness.  They come from nonlinear impacts of the same energy on isotropic, quasi-isotropic
 # and cross-ply plates, clamped and simply supported.
@@ -135,53 +133,19 @@ def softness(ratio: float, in_plane: InPlane, *, preloaded: bool = False) -> str
     return f"the force is {more} {size} too low at the same energy{edges}{preload}"
 
 
-STRAIN = 0.01  # largest strain for which plies are taken as linear
-# Exposure, or force over the delamination threshold, above which a case is beyond it.  A
-# search for the velocity that reaches 1 ends a hair above.
-CROSSED = 1.0001
-SLOPE = 0.25  # largest slope of a nonlinear plate for which its rotations are moderate
-INDENTATION = 0.25  # largest share of the thickness for which the law of a half-space holds
-
 # Validity of a case without a reason to doubt it, and of one that was not computed.
 VALID = "ok"
 FAILED = "failed"
 SEPARATOR = "; "  # between the reasons of a case
-
-
-class Reason(StrEnum):
-    """Reason to doubt a case."""
-
-    OPEN = "peak not reached"
-    AGAIN = "may touch again"
-    BENT_HELD = f"w > {LIMITS[InPlane.HELD]} h"
-    BENT_FREE = f"w > {LIMITS[InPlane.FREE]} h"
-    STEEP = f"slope > {SLOPE}"
-    STRAINED = "strain > 1 %"
-    SOFT = "indentation > h/4"
-    BROKEN = "exposure > 1"
-    DELAMINATED = "peak force > threshold"
-    OTHER = "other"  # in files of other versions
-
-
-# Reasons by the supports of the edges; unknown supports have the limit of held edges.
-BENT = {
-    InPlane.HELD: Reason.BENT_HELD,
-    InPlane.FREE: Reason.BENT_FREE,
-    InPlane.UNKNOWN: Reason.BENT_HELD,
-    InPlane.WINDOW: Reason.BENT_HELD,
-}
-# What the reasons of a case mean, for the lines of a summary.
-MEANING: dict[str, str] = {
-    Reason.OPEN: "with an open peak",
-    Reason.AGAIN: "in which the plate may touch again (open peak)",
-    Reason.BENT_HELD: f"beyond the linear plate ({Reason.BENT_HELD})",
-    Reason.BENT_FREE: f"beyond the linear plate ({Reason.BENT_FREE})",
-    Reason.STEEP: f"beyond moderate rotations ({Reason.STEEP})",
-    Reason.STRAINED: f"beyond linear plies ({Reason.STRAINED})",
-    Reason.SOFT: f"beyond the contact law ({Reason.SOFT})",
-    Reason.BROKEN: f"elastic predictions ({Reason.BROKEN})",
-    Reason.DELAMINATED: (f"elastic predictions ({Reason.DELAMINATED})"),
-    Reason.OTHER: "doubtful for other reasons",
+OTHER = Doubt("other", "doubtful for other reasons", TrustLevel.DOUBTFUL)  # of other versions
+# All doubts by their reasons, in the order of a summary.
+DOUBTS = {
+    doubt.reason: doubt
+    for doubt in (
+        *(meaning.doubt for meaning in ENDS.values() if meaning.doubt is not None),
+        *(limit.doubt for limit in LIMITS),
+        OTHER,
+    )
 }
 
 
@@ -195,33 +159,39 @@ def reasons_of(validity: str) -> list[str]:
     return [] if validity in ("", VALID, FAILED) else validity.split(SEPARATOR)
 
 
-def counted(validity: Texts) -> Iterator[tuple[Reason, Bools]]:
-    """Count the cases with each reason, in the order of :class:`Reason`.
+def counted(validity: Texts) -> Iterator[tuple[Doubt, Bools]]:
+    """Yield the doubts about cases, with a mask of the cases, in the order of :data:`DOUBTS`.
 
     Reasons of other versions, whose number is not bounded, are counted together.
     """
-    reasons = set(Reason)
     texts = validity.tolist()
     cases_of = {
-        text: {name if name in reasons else Reason.OTHER for name in reasons_of(text)}
-        for text in set(texts)
+        text: {DOUBTS.get(reason, OTHER) for reason in reasons_of(text)} for text in set(texts)
     }
-    for reason in Reason:
-        if any(reason in names for names in cases_of.values()):
-            yield reason, np.array([reason in cases_of[text] for text in texts], dtype=bool)
+    for doubt in DOUBTS.values():
+        if any(doubt in doubts for doubts in cases_of.values()):
+            yield doubt, np.array([doubt in cases_of[text] for text in texts], dtype=bool)
 
 
 @dataclass(frozen=True)
 class Extent:
-    """Largest values of cases, (cases,) each. They are lower bounds where the end is undecided."""
+    """Largest values of cases, lower bounds where the end is undecided.
+
+    Attributes
+    ----------
+    end : ndarray (cases,)
+        States of the contact at their ends.
+    largest : mapping of ModelLimit to ndarray (cases,) or float
+        Values by the limits of the quantities; NaN where they are not known.
+    of_rows : collection of str
+        Reasons that the stored rows of a run gave, for the limits that are not in `largest`.
+    threshold : ndarray (cases,) or float
+        Delamination threshold, force.
+    """
 
     end: Texts
-    peak: Floats
-    indentation: Floats
-    deflection: Floats  # under the load; NaN of a plate that its supports let move
-    exposure: Floats | float = np.nan
+    largest: Mapping[ModelLimit, Floats | float]
     threshold: Floats | float = np.nan
-    # Reasons that the stored rows of a run gave: slope and strain.
     of_rows: Collection[str] = ()
 
 
@@ -252,29 +222,43 @@ class Judge(NamedTuple):
         return softness(ratio, self.in_plane, preloaded=self.preloaded)
 
     @property
-    def limit(self) -> float:
-        """Deflection over the thickness up to which the plate is taken as linear.
+    def deflection(self) -> ModelLimit:
+        """ModelLimit of the deflection of a linear plate over its thickness."""
+        return DEFLECTION[self.in_plane]
 
-        It is infinite if the plate is not taken as linear.
+    def largest(self, limit: ModelLimit) -> float:
+        """Return the largest value within a limit, in the deck's units.
+
+        A plate that is not taken as linear has no limit of its deflection.
         """
-        return math.inf if self.nonlinear else LIMITS[self.in_plane]
+        if limit in DEFLECTION.values():
+            return math.inf if self.nonlinear else limit.value * self.thickness
+        return limit.value * (self.indented if limit is INDENTATION else 1.0)
 
     def validity(self, extent: Extent) -> Texts:
         """Return ``"ok"``, or the reasons to doubt each case."""
-        h = self.thickness
-        with np.errstate(invalid="ignore"):
-            masks = {
-                Reason.OPEN: np.isin(extent.end, (End.RISING, End.BETWEEN)),
-                Reason.AGAIN: extent.end == End.AGAIN,
-                BENT[self.in_plane]: extent.deflection > self.limit * h,
-                Reason.STEEP: np.full(extent.peak.shape, Reason.STEEP in extent.of_rows),
-                Reason.STRAINED: np.full(extent.peak.shape, Reason.STRAINED in extent.of_rows),
-                Reason.SOFT: extent.indentation > INDENTATION * self.indented,
-                Reason.BROKEN: np.broadcast_to(extent.exposure > CROSSED, extent.peak.shape),
-                Reason.DELAMINATED: extent.peak > CROSSED * extent.threshold,
-            }
+        masks: dict[str, Bools] = {}
+        for end, meaning in ENDS.items():
+            if meaning.doubt is not None:
+                reason = meaning.doubt.reason
+                masks[reason] = masks.get(reason, np.zeros(len(extent.end), bool)) | (
+                    extent.end == end
+                )
+        for limit in LIMITS:
+            if limit in extent.largest:
+                most = self.largest(limit) * (extent.threshold if limit is THRESHOLD else 1.0)
+                with np.errstate(invalid="ignore"):
+                    beyond = np.asarray(extent.largest[limit] > most)
+            else:
+                beyond = np.asarray(limit.reason in extent.of_rows)
+            masks[limit.reason] = np.broadcast_to(beyond, extent.end.shape)
         names = list(masks)
         rows = np.column_stack(list(masks.values()))
         kinds, which = np.unique(rows, axis=0, return_inverse=True)
         texts = [joined(list(compress(names, kind))) for kind in kinds.tolist()]
         return np.array(texts, dtype=np.str_)[which.reshape(-1)]
+
+
+def of_face(judge: Judge) -> str:
+    """Say which thickness the limit of the indentation has, where it is not the plate's."""
+    return ", where h is the struck face's thickness" if judge.struck else ""

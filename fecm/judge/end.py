@@ -1,4 +1,4 @@
-"""State of the contact at the end of a run, and which of its values can still change.
+"""State of the contact at the end of a run, which of its values can still change, and its words.
 
 The functions take many cases at once: arrays (cases,).
 """
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
+from fecm.judge.limits import Doubt, TrustLevel
 
 Texts = NDArray[np.str_]
 
@@ -33,7 +34,6 @@ GONE = 0.9
 # Factor on the largest compliance w^2/(2 E) seen in a run, as the static one may be larger.
 RESERVE = 1.5
 LEAST_WORK = 1.0e-3  # energy of the plate over the initial energy for which w^2/(2 E) is used
-LATE = 0.8  # share of the run; a largest value that comes later may still grow
 RINGING = 1.01  # least ratio of a new largest deflection to the largest so far
 
 
@@ -48,29 +48,89 @@ class End(StrEnum):
     BETWEEN = "between contacts"  # no contact, but the projectile still approaches the plate
 
 
-# States that leave the peak force open.
-OPEN_PEAKS = (End.AGAIN, End.RISING, End.BETWEEN)
+class EndMeaning(NamedTuple):
+    """What an end means for the numbers of a run.
+
+    Attributes
+    ----------
+    level : TrustLevel
+        Trust in the numbers.
+    where : str
+        Where the run ends, in a note.
+    what_is_open : str
+        What the end leaves open.
+    remedy : str
+        What to do about it.
+    brief : str
+        Where the run ends, beside a number that it leaves open.
+    doubt : Doubt, optional
+        What is said of cases; None where the peak is known.
+    """
+
+    level: TrustLevel
+    where: str = ""
+    what_is_open: str = ""
+    remedy: str = ""
+    brief: str = ""
+    doubt: Doubt | None = None
+
+    @property
+    def words(self) -> str:
+        """What is open, and what to do about it."""
+        return "; ".join(filter(None, [self.what_is_open, self.remedy]))
+
+    def note(self, remedy: str = "") -> str:
+        """Return the note of a run, by default with the remedy of the row."""
+        return f"the run ends {self.where}: {self.what_is_open}; {remedy or self.remedy}"
+
+
 OPEN_LATER = "the end of the contact, the permanent indentation and the energies after it"
-# What a run can do about an open end.
+LATER_IS_OPEN = f"{OPEN_LATER} are open"
+LOWER_BOUND = f"its largest force is a lower bound of the peak force, and {LATER_IS_OPEN}"
 GO_ON = "take more steps, or run it with --extend"
-LOWER_BOUND = f"its largest force is a lower bound of the peak force, and {OPEN_LATER} are open"
-# Notes of runs whose end leaves something open.
-OPEN_ENDS = {
-    End.APART: (
-        "the run ends without contact, after the peak force, but the plate may touch the "
-        f"projectile again: {OPEN_LATER} are open"
+DECIDING_STEPS = "about {steps} more steps decide it (--extend)"  # instead, if they are known
+PEAK_NOT_REACHED = Doubt("peak not reached", "with an open peak", TrustLevel.OUTSIDE)
+MAY_TOUCH = Doubt(
+    "may touch again", "in which the plate may touch again (open peak)", TrustLevel.OUTSIDE
+)
+ENDS = {
+    End.OVER: EndMeaning(TrustLevel.WITHIN),
+    End.APART: EndMeaning(
+        TrustLevel.DOUBTFUL,
+        "without contact, after the peak force, but the plate may touch the projectile again",
+        LATER_IS_OPEN,
+        GO_ON,
     ),
-    End.PASSED: (f"the run ends in contact, after the peak force: {OPEN_LATER} are open; {GO_ON}"),
-    End.RISING: (f"the run ends in contact, before the projectile leaves: {LOWER_BOUND}; {GO_ON}"),
-    End.BETWEEN: (
-        "the run ends between two contacts, as the projectile still approaches: "
-        f"{LOWER_BOUND}; {GO_ON}"
+    End.PASSED: EndMeaning(
+        TrustLevel.DOUBTFUL, "in contact, after the peak force", LATER_IS_OPEN, GO_ON, "in contact"
     ),
-    End.AGAIN: (
-        "the run ends without contact, but the projectile leaves so slowly that the plate may "
-        f"touch it again: {LOWER_BOUND}"
+    End.RISING: EndMeaning(
+        TrustLevel.OUTSIDE,
+        "in contact, before the projectile leaves",
+        LOWER_BOUND,
+        GO_ON,
+        "in contact",
+        PEAK_NOT_REACHED,
+    ),
+    End.BETWEEN: EndMeaning(
+        TrustLevel.OUTSIDE,
+        "between two contacts, as the projectile still approaches",
+        LOWER_BOUND,
+        GO_ON,
+        "between two contacts",
+        PEAK_NOT_REACHED,
+    ),
+    End.AGAIN: EndMeaning(
+        TrustLevel.OUTSIDE,
+        "without contact, but the projectile leaves so slowly that the plate may touch it again",
+        LOWER_BOUND,
+        GO_ON,
+        "before the plate is out of reach of the projectile",
+        MAY_TOUCH,
     ),
 }
+# States that leave the peak force open.
+OPEN_PEAKS = tuple(end for end, meaning in ENDS.items() if meaning.doubt is not None)
 
 
 class LastContact(NamedTuple):
@@ -226,7 +286,7 @@ def over(end: Texts) -> Bools:
 
 def peak_known(end: Texts) -> Bools:
     """Return a mask of the cases whose largest force so far is the peak force."""
-    return np.isin(end, (End.OVER, End.PASSED, End.APART))
+    return np.isin(end, OPEN_PEAKS, invert=True)
 
 
 def decided(largest: Floats, last: Floats, end: Texts) -> Floats:

@@ -93,11 +93,21 @@ def mode_at(deck: Deck, laminate: int, criterion: str, ply: int, mode: str) -> s
 
 def exposed(deck: Deck, laminate: int, exposure: PlyExposure) -> str:
     """Return mode, criterion and ply of an exposure in a numbered laminate."""
-    mode = mode_at(deck, laminate, exposure.criterion, exposure.ply, exposure.mode)
-    materials = materials_at(deck, laminate, exposure.criterion, exposure.ply)
-    return (
-        f"{mode}, {spelt(exposure.criterion)}, {where(exposure.criterion, exposure.ply, materials)}"
-    )
+    criterion, ply = exposure.criterion, exposure.ply
+    mode = mode_at(deck, laminate, criterion, ply, exposure.mode)
+    place = where(criterion, ply, materials_at(deck, laminate, criterion, ply))
+    return failure_in_words(criterion, mode, place)
+
+
+def failure_in_words(criterion: str, mode: str, where: str) -> str:
+    """Name mode, criterion, and ply or interface.
+
+    Examples
+    --------
+    >>> failure_in_words("tsai_wu", "interactive", "ply 3")
+    'interactive (tsai wu), ply 3'
+    """
+    return f"{mode} ({spelt(criterion)}), {where}"
 
 
 def yield_stress(deck: Deck, material: int) -> float:

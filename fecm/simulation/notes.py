@@ -1,41 +1,52 @@
-"""Judgement of a finished run: largest values, notes, and validity."""
+"""Notes and validity of a finished run, from its largest values.
+
+What a note says, and from which size on, are rows of :mod:`fecm.judge.limits`.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fecm._typing import Array, Floats
 from fecm.deck.model import Gages, Indentation
 from fecm.deck.units import MODULUS, in_si, quantity, unit_of
+from fecm.judge.criteria import spelt, yield_stress
+from fecm.judge.end import DECIDING_STEPS, ENDS, End
+from fecm.judge.exposure_bands import coarse_mesh_note
+from fecm.judge.limits import (
+    ENERGY_BALANCE,
+    EXPOSURE,
+    FAIL_EVALUATIONS,
+    GRAVITY,
+    INDENTATION,
+    ITERATION,
+    LATE_VALUE,
+    LATER_CONTACT,
+    PULL,
+    SLOPE,
+    SPRING_BACK,
+    STRAIN,
+    STRETCHED_FREQUENCY,
+    STRETCHED_THRESHOLD,
+    THRESHOLD,
+    YIELDING,
+    ModelLimit,
+)
+from fecm.judge.validity import joined, of_face, unsafe
 from fecm.mechanics.mesh import rigid_deflections
 from fecm.mechanics.points import shortest_side
 from fecm.mechanics.solutions import static_support
 from fecm.problem.contact_estimates import mean_pressure
 from fecm.problem.estimates import MOST_SOLVED
-from fecm.results.criteria import spelt, yield_stress
-from fecm.results.end import GO_ON, LATE, OPEN_ENDS, OPEN_PEAKS, End
-from fecm.results.exposure_bands import LEAST_REACH
-from fecm.results.exposures import FEWEST, count_evaluations, largest_exposures
+from fecm.results.exposures import count_evaluations, largest_exposures
 from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
 from fecm.results.run_metrics import start_w_of, steps_to_decide
 from fecm.results.stored import row_blocks
-from fecm.results.validity import (
-    BENT,
-    CROSSED,
-    INDENTATION,
-    REMEDY,
-    SLOPE,
-    STRAIN,
-    TOO_SOFT,
-    Reason,
-    joined,
-    unsafe,
-)
 from fecm.simulation.simulation import Simulation
 
 BENDING = ("kappa_x", "kappa_y", "kappa_xy")
@@ -63,7 +74,7 @@ def largest_deflection(simulation: Simulation, result: Result) -> RunPeak:
 def largest_strain(simulation: Simulation, result: Result) -> RunPeak:
     """Return the largest principal strain of both faces, away from the load, and of the gages.
 
-    It is zero if no strain of the elements comes near :data:`~fecm.results.validity.STRAIN`.
+    It is zero if no strain of the elements comes near :data:`~fecm.judge.limits.STRAIN`.
     """
     stored = [
         *_face_strains(simulation, result, "tape8"),
@@ -132,7 +143,7 @@ def _face_strains(simulation: Simulation, result: Result, group: str) -> Iterato
     names = [*MEMBRANE, *BENDING] if has_membrane else [*BENDING]
     for times, values in _blocks(result, group, names):
         sizes = [max(part.max(), -part.min()) for part in values]
-        if np.abs(preload).sum() + sum(sizes[:-3]) + half.max() * sum(sizes[-3:]) < STRAIN:
+        if np.abs(preload).sum() + sum(sizes[:-3]) + half.max() * sum(sizes[-3:]) < STRAIN.value:
             continue  # a bound, as few runs come near the limit
         membrane = values[:-3] or [np.zeros(())] * 3
         curvature = [half * kappa for kappa in values[-3:]]
@@ -184,12 +195,6 @@ def _peak_at(values: Floats, times: Floats, place: tuple[float, float]) -> RunPe
     return _peak(values, times, *map(np.asarray, place))
 
 
-# Share of the largest frequency that the time step allows, from which on there is a note.
-NEAR = 0.95
-# Share of the bending stress at the load from which on membrane stress counts there.
-STRETCHED = 0.2
-
-
 def doubts(simulation: Simulation, result: Result) -> Iterator[str]:
     """Yield notes about the stored rows of a nonlinear plate."""
     if "membrane/largest_force" in result:
@@ -217,19 +222,18 @@ def _time_step(simulation: Simulation, result: Result) -> Iterator[str]:
         tension * (2.0 * math.pi / side) ** 2 / min(laminate.mass for laminate in plate.laminates)
     )
     allowed = (2.0 / dt) ** 2
-    if (2.0 / problem.safe_time_step) ** 2 + growth <= NEAR**2 * allowed:
+    near = STRETCHED_FREQUENCY.value**2
+    if (2.0 / problem.safe_time_step) ** 2 + growth <= near * allowed:
         return
     linear = (2.0 / problem.critical_time_step) ** 2
     # A time step that is as near to the linear plate's limit was chosen on purpose.
-    limit = allowed * (NEAR**2 if linear < NEAR**2 * allowed else 1.0)
+    limit = allowed * (near if linear < near * allowed else 1.0)
     if linear + growth > limit:
-        force = quantity(largest.value, unit_of("force/length", result.units))
-        when = quantity(largest.time, unit_of("time", result.units))
-        share = math.sqrt((linear + growth) / allowed)
-        yield (
-            f"the membrane force reaches {force} at time {when}: it may raise the plate's largest "
-            f"frequency from {math.sqrt(linear / allowed):.1%} of 2/DT to {share:.1%}; a smaller "
-            "DT is safer"
+        yield STRETCHED_FREQUENCY.say(
+            force=quantity(largest.value, unit_of("force/length", result.units)),
+            time=quantity(largest.time, unit_of("time", result.units)),
+            linear=math.sqrt(linear / allowed),
+            share=math.sqrt((linear + growth) / allowed),
         )
 
 
@@ -246,25 +250,17 @@ def _delamination(simulation: Simulation, result: Result) -> Iterator[str]:
         for name in ("time", "force_at_load", "moment_at_load")
     )
     bending = 6.0 * moment / simulation.problem.laminate.thickness
-    if bending > 0.0 and force > STRETCHED * bending:
-        time = quantity(when, unit_of("time", result.units))
-        pull = quantity(force, unit_of("force/length", result.units))
-        yield (
-            f"at time {time} the membrane force under the load is {pull}, {force / bending:.0%} of "
-            "6 M/h: the threshold of DELA is for a plate in bending"
+    if bending > 0.0 and force > STRETCHED_THRESHOLD.value * bending:
+        yield STRETCHED_THRESHOLD.say(
+            time=quantity(when, unit_of("time", result.units)),
+            force=quantity(force, unit_of("force/length", result.units)),
+            share=force / bending,
         )
 
 
-# Error of the energy balance, relative to the supplied energy, that triggers a warning.
-ENERGY_WARNING = 0.01
-# Share of the force above which a note says that supports pull, and least share of the static
-# deflection at the peak force at which they are taken to carry it.
-PULL = 0.1
+# Share of the static deflection at the peak force from which on the supports carry the force.
 STATIC = 0.5
 STANDARD_GRAVITY = 9.80665  # m/s^2
-HEAVY = 0.02  # share of the peak force that gravity adds, above which a note says so
-FULLY_PLASTIC = 3.0  # mean pressure over the yield stress at which a metal flows under a sphere
-LATER = 1.1  # least ratio of a later contact's peak to the first's for a note
 
 
 class RunVerdict(NamedTuple):
@@ -274,10 +270,10 @@ class RunVerdict(NamedTuple):
     validity: str  # ``"ok"`` or reasons; empty without impact steps
 
 
-class Doubt(NamedTuple):
-    """Quantity beyond the range of the model."""
+class Beyond(NamedTuple):
+    """ModelLimit of the model that a run exceeds."""
 
-    reason: Reason
+    limit: ModelLimit
     note: str
 
 
@@ -286,44 +282,40 @@ def judge_run(simulation: Simulation, result: Result) -> RunVerdict:
     beyond = list(_beyond(simulation, result))
     notes = [
         *_numerical(simulation),
-        *(doubt.note for doubt in beyond),
+        *(exceeded.note for exceeded in beyond),
         *_few_evaluations(simulation, result),
         *doubts(simulation, result),
     ]
     end = result.end
     if end is None:
         return RunVerdict(notes, "")
-    if end in OPEN_ENDS:
-        notes.append(OPEN_ENDS[end] + _remedy(result, end))
+    meaning = ENDS[end]
+    if end is not End.OVER:
+        notes.append(meaning.note(_remedy(result, end)))
     notes += [*_later_peak(result), *_late_values(result, end)]
     notes += [*_pull(simulation, result), *_gravity(simulation, result)]
     notes += [*_springs_back(simulation, result), *_yielding(simulation, result)]
-    reasons = [Reason.AGAIN] if end is End.AGAIN else [Reason.OPEN] if end in OPEN_PEAKS else []
-    reasons += [doubt.reason for doubt in beyond]
+    reasons = [] if meaning.doubt is None else [meaning.doubt.reason]
+    reasons += [exceeded.limit.reason for exceeded in beyond]
     peak_force = result.symmetry_factor * simulation.state.monitor.peak_force
-    if peak_force > CROSSED * result.threshold.get("force", np.inf):
-        reasons.append(Reason.DELAMINATED)
+    if peak_force > THRESHOLD.value * result.threshold.get("force", np.inf):
+        reasons.append(THRESHOLD.reason)
     return RunVerdict(notes, joined(reasons))
 
 
 def _remedy(result: Result, end: End) -> str:
-    """Say how many steps decide whether the plate touches the projectile again."""
-    if end not in (End.AGAIN, End.APART):
+    """Say how many steps decide whether the plate touches the projectile again, if it is known."""
+    if end not in (End.AGAIN, End.APART) or (steps := steps_to_decide(result)) is None:
         return ""
-    if (steps := steps_to_decide(result)) is None:
-        return f"; {GO_ON}"
-    return f"; about {steps} more steps decide it (--extend)"
+    return DECIDING_STEPS.format(steps=steps)
 
 
 def _later_peak(result: Result) -> Iterator[str]:
     """Yield a note if a later contact has raised the peak force."""
     metrics, unit = result.metrics, result.units.get("force", "")
-    if metrics["peak_force"] > LATER * metrics["first_peak"]:
+    if metrics["peak_force"] > LATER_CONTACT.value * metrics["first_peak"]:
         first = f"{metrics['first_peak']:.4g} {unit}".rstrip()
-        yield (
-            f"the peak force is reached in contact {metrics['peak_contact']}, after reflections in "
-            f"the plate: it depends on damping; the peak of the first contact is {first}"
-        )
+        yield LATER_CONTACT.say(contact=metrics["peak_contact"], first=first)
 
 
 def _late_values(result: Result, end: End) -> Iterator[str]:
@@ -333,18 +325,15 @@ def _late_values(result: Result, end: End) -> Iterator[str]:
     times, w = result["history/time"], result["history/plate_w"]
     late = []
     is_held = MOBILITY not in result.attributes_of("history")  # a free plate moves away
-    if is_held and times[w.argmax()] > LATE * times[-1]:
+    if is_held and times[w.argmax()] > LATE_VALUE.value * times[-1]:
         late.append("deflection")
     late += [
         f"exposure {spelt(exposure.criterion)}"
         for exposure in largest_exposures(result)
-        if exposure.time > LATE * times[-1]
+        if exposure.time > LATE_VALUE.value * times[-1]
     ]
     if late:
-        yield (
-            f"the largest {', '.join(late)} came in the last fifth of the run, after the contact: "
-            "the plate vibrates on and may exceed it; take more steps"
-        )
+        yield LATE_VALUE.say(quantities=", ".join(late))
 
 
 def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
@@ -364,12 +353,8 @@ def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
     stiffness, pull = support
     peak = int(force.argmax())
     w = result["history/plate_w"][peak] - start_w_of(result)
-    if pull > PULL and w * stiffness > STATIC * force[peak]:
-        yield (
-            f"the supports pull the plate down with {pull:.0%} of a static load at the "
-            "impact; a window or a ring can only push: the plate lifts off there, is softer, and "
-            "its peak force is lower"
-        )
+    if pull > PULL.value and w * stiffness > STATIC * force[peak]:
+        yield PULL.say(pull=pull)
 
 
 def _gravity(simulation: Simulation, result: Result) -> Iterator[str]:
@@ -392,24 +377,15 @@ def _gravity(simulation: Simulation, result: Result) -> Iterator[str]:
     share = float(mass * STANDARD_GRAVITY / unit * way / energy)
     x = 0.5 * share
     rise = x + math.hypot(1.0, x) - 1.0
-    if rise > HEAVY:
-        yield (
-            f"gravity is left out: the weight of a projectile that falls adds {share:.1%} to the "
-            "impact energy until it turns (M g w); the force and the deflection are then about "
-            f"{rise:.0%} larger"
-        )
+    if rise > GRAVITY.value:
+        yield GRAVITY.say(share=share, rise=rise)
 
 
 def _springs_back(simulation: Simulation, result: Result) -> Iterator[str]:
     """Yield a note if the plate is deflected before the impact and nothing holds it so."""
     start = start_w_of(result)
     if start and simulation.state.rest_factor is None:
-        w = quantity(start, unit_of("length", result.units))
-        yield (
-            f"the impact starts at w = {w} under the load, but the nodal forces do not hold the "
-            "plate there during the impact: it moves without the projectile too; a static solution "
-            "at the load factor of the impact, to the default tolerance, would be held"
-        )
+        yield SPRING_BACK.say(w=quantity(start, unit_of("length", result.units)))
 
 
 def _yielding(simulation: Simulation, result: Result) -> Iterator[str]:
@@ -423,14 +399,9 @@ def _yielding(simulation: Simulation, result: Result) -> Iterator[str]:
         return
     peak = float(result.whole("history/force").max())
     pressure = mean_pressure(deck, deck.plies[material], peak, result.symmetry_factor)
-    if pressure > FULLY_PLASTIC * stress:
+    if pressure > YIELDING.value * stress:
         size = quantity(stress, unit_of(MODULUS, result.units))
-        yield (
-            f"the mean contact pressure reaches about {pressure / stress:.2g} times the yield "
-            f"stress {size} of the struck face: beyond 3 a metal flows, and an elastic law has too "
-            "large a force and rebound and no permanent indentation; measure the law (fecm indent "
-            "fit)"
-        )
+        yield YIELDING.say(ratio=pressure / stress, stress=size)
 
 
 def _numerical(simulation: Simulation) -> Iterator[str]:
@@ -438,12 +409,12 @@ def _numerical(simulation: Simulation) -> Iterator[str]:
     state = simulation.state
     has_slips = not simulation.model.variant.is_report
     error, step = state.monitor.worst_error, state.monitor.worst_step
-    if error > ENERGY_WARNING:
-        off = f"the energy balance is off by {error:.2%} of the supplied energy, at step {step}"
+    if error > ENERGY_BALANCE.value:
+        off = ENERGY_BALANCE.say(error=error, step=step)
         yield f"{off} (not a failure, as slips are active)" if has_slips else off
     unconverged = state.impact.unconverged_steps if state.impact is not None else 0
     if unconverged and not has_slips:
-        yield f"the contact iteration did not converge in {unconverged} steps; a smaller DT helps"
+        yield ITERATION.say(steps=unconverged)
 
 
 def _few_evaluations(simulation: Simulation, result: Result) -> Iterator[str]:
@@ -452,12 +423,12 @@ def _few_evaluations(simulation: Simulation, result: Result) -> Iterator[str]:
         return
     yield from _coarse_elements(simulation, result)
     count = count_evaluations(result)
-    if "history/force" in result and count < FEWEST and result["history/force"].any():
-        yield (
-            f"FAIL was evaluated {count} times during contact, less than {FEWEST}: larger "
-            "exposures and the first failure may be missed; evaluate more often, in the loop of "
-            "the steps"
-        )
+    if (
+        "history/force" in result
+        and count < FAIL_EVALUATIONS.value
+        and result["history/force"].any()
+    ):
+        yield FAIL_EVALUATIONS.say(count=count)
 
 
 def _coarse_elements(simulation: Simulation, result: Result) -> Iterator[str]:
@@ -466,81 +437,52 @@ def _coarse_elements(simulation: Simulation, result: Result) -> Iterator[str]:
     if mesh is None or (mesh.is_measured and mesh.coarseness <= mesh.resolved):
         return
     reach, unit = simulation.problem.reach_of_load, result.units.get("length", "")
-    side, radius, needed, length = (
-        f"{factor * reach:.3g} {unit}".rstrip()
-        for factor in (mesh.coarseness, 1.0, mesh.resolved, mesh.bending_reach)
-    )
-    band = "have a wide band" if mesh.is_measured else "are not bounded"
-    compare = "compare them with those of a finer mesh (fecm check --mesh-error)"
-    if not mesh.nine_nodes:
-        why = f"the elements there do not have nine nodes; {compare}"
-    elif mesh.bending_reach < LEAST_REACH:
-        why = (
-            f"the load bends the plate over {length}, and c + h/2 is {radius}: the plate is too "
-            f"thick for a band; {compare}"
-        )
-    else:
-        where = "" if mesh.at_corner else ", and place a corner of elements at the load"
-        why = (
-            f"the elements there have sides of {side}, and c + h/2 is {radius}; refine the mesh at "
-            f"the load to sides of {needed}{where}"
-        )
-    yield f"exposures at the load {band}: {why}"
+    yield coarse_mesh_note(mesh, lambda factor: f"{factor * reach:.3g} {unit}".rstrip())
 
 
-def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
-    """Yield deflection, strain, indentation and exposures that are beyond their limits."""
+def _beyond(simulation: Simulation, result: Result) -> Iterator[Beyond]:
+    """Yield the limits that deflection, strain, indentation and exposures exceed."""
+    judge = simulation.problem.judge
+
+    def beyond(limit: ModelLimit, peak: RunPeak, size: str, **sizes: Any) -> Iterator[Beyond]:
+        if peak.value > judge.largest(limit):
+            place = _place(result, peak)
+            yield Beyond(limit, limit.say(size=size, place=place, **sizes))
+
     with np.errstate(all="ignore"):
         deflection = largest_deflection(simulation, result)
         slope = largest_slope(result)
         strain = largest_strain(simulation, result)
         indentation = largest_indentation(simulation, result)
-    limits = simulation.problem.judge
-    h = limits.thickness
-    if deflection.value > limits.limit * h:
-        yield Doubt(BENT[limits.in_plane], _bent(simulation, result, deflection))
-    if slope.value > SLOPE:
-        reached = _reached(result, "slope", f"{slope.value:.3g}", slope)
-        yield Doubt(
-            Reason.STEEP,
-            f"{reached} {SLOPE}, von Kármán strains, which are for moderate rotations, have an "
-            f"error of about slope²/2 = {slope.value**2 / 2.0:.1%}",
-        )
-    if strain.value > STRAIN:
-        reached = _reached(result, "strain", f"{strain.value:.2%}", strain)
-        yield Doubt(Reason.STRAINED, f"{reached} 1 %, linear plies are doubtful")
-    if indentation.value > INDENTATION * limits.indented:
-        size = _size(result, indentation.value, limits.indented)
-        reached = _reached(result, "indentation", size, indentation)
-        of_face = ", where h is the struck face's thickness" if limits.struck else ""
-        yield Doubt(
-            Reason.SOFT, f"{reached} h/4{of_face}, the contact law of a half-space is doubtful"
-        )
+    h, indented = judge.thickness, judge.indented
+    is_free = rigid_deflections(simulation.problem.mesh).size > 0
+    yield from beyond(
+        judge.deflection,
+        deflection,
+        _size(result, deflection.value, h),
+        quantity="deflection without the rigid-body motion" if is_free else "deflection",
+        error=_error(simulation, deflection.value / h),
+        remedy=simulation.model.variant.is_report,
+    )
+    yield from beyond(SLOPE, slope, f"{slope.value:.3g}", error=slope.value**2 / 2.0)
+    yield from beyond(STRAIN, strain, f"{strain.value:.2%}")
+    size = _size(result, indentation.value, indented)
+    yield from beyond(INDENTATION, indentation, size, of_face=of_face(judge))
     broken = [
         spelt(exposure.criterion)
         for exposure in largest_exposures(result)
-        if exposure.exposure > CROSSED
+        if exposure.exposure > EXPOSURE.value
     ]
     if broken:
-        yield Doubt(
-            Reason.BROKEN,
-            f"exposure above 1 ({', '.join(broken)}): the run continues elastically; "
-            "softening after the first failure is not modelled",
-        )
+        yield Beyond(EXPOSURE, EXPOSURE.say(criteria=", ".join(broken)))
 
 
-def _bent(simulation: Simulation, result: Result, peak: RunPeak) -> str:
-    """Yield a note if the deflection is beyond the linear plate."""
-    limits = simulation.problem.judge
-    is_free = rigid_deflections(simulation.problem.mesh).size > 0
-    what = "deflection without the rigid-body motion" if is_free else "deflection"
-    h = limits.thickness
-    size = _size(result, peak.value, h)
-    note = f"{_reached(result, what, size, peak)} {limits.limit} h, {TOO_SOFT}"
-    if simulation.problem.has_impact:
-        error, meaning = limits.softness(peak.value / h), unsafe(curved=limits.curved)
-        note = f"{note}: {error}; {meaning}"
-    return f"{note}; {REMEDY}" if simulation.model.variant.is_report else note
+def _error(simulation: Simulation, ratio: float) -> str:
+    """Format the error of the linear plate at a deflection over its thickness, if it is known."""
+    judge = simulation.problem.judge
+    if not simulation.problem.has_impact:
+        return ""
+    return f": {judge.softness(ratio)}; {unsafe(curved=judge.curved)}"
 
 
 def _size(result: Result, value: float, thickness: float) -> str:
@@ -549,9 +491,7 @@ def _size(result: Result, value: float, thickness: float) -> str:
     return f"{length} = {value / thickness:.3g} h"
 
 
-def _reached(result: Result, what: str, value: str, peak: RunPeak) -> str:
-    """Return the start of a note: the value that a quantity reaches, where and when."""
+def _place(result: Result, peak: RunPeak) -> str:
+    """Format where and when a quantity is largest."""
     time = f"time {peak.time:.6g} {result.units.get('time', '')}".rstrip()
-    if not math.isnan(peak.x):
-        time = f"({peak.x:.6g}, {peak.y:.6g}), {time}"
-    return f"the {what} reaches {value} at {time}: beyond"
+    return time if math.isnan(peak.x) else f"({peak.x:.6g}, {peak.y:.6g}), {time}"
