@@ -215,9 +215,9 @@ def test_a_bar_per_ply_leaves_out_what_is_under_the_load(failing: Result) -> Non
     assert bars.get_ylim()[0] > bars.get_ylim()[1]  # the struck face at the top
     assert [1.0, 1.0] in [list(line.get_xdata()) for line in bars.get_lines()]
     (line,) = (line for line in run_summary(failing) if line.startswith("puck"))
-    value, mode = plate.get_title(loc="left").split(" (puck): ")
+    value, mode = plate.get_title(loc="left").split(" (puck)")[0].split(": ")
     assert line.split(":")[0].split()[-1] == value
-    assert mode.split(",")[0] in line
+    assert mode in line
     names = ["puck", "exposure 1", "largest", "under the load", "circle around the load"]
     assert legend_of(figure) == names
 

@@ -317,7 +317,8 @@ def test_with_takes_the_energy_and_the_radius_of_the_whole_impact() -> None:
 def test_a_quarter_needs_no_word_of_doubt() -> None:
     for plate in PLATES:
         for part in PARTS:
-            assert findings(deck(plate, part)).keys() <= {"W449", "W415"}
+            # W469: the toughness is low, so that the threshold is reached.
+            assert findings(deck(plate, part)).keys() <= {"W449", "W415", "W469"}
 
 
 def test_an_impact_beside_the_line_is_taken_once_and_its_images_are_named() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fecm
+from fecm.judge import end
 from fecm.mechanics import impact as impacts
 from fecm.mechanics import laminate as laminates
 from fecm.mechanics import points, quick_models, strains
@@ -16,7 +17,7 @@ from fecm.mechanics.contact_law import (
 from fecm.mechanics.impact import ImpactSystem
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.problem import parts
-from fecm.results import end, metrics
+from fecm.results import metrics
 from tests.breaks import (
     Breaks,
     changed,
