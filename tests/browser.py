@@ -130,8 +130,8 @@ class Browser:
     def requests(self) -> list[str]:
         """Addresses the page has asked for, without those inside the page."""
         sent = [one for one in self.events if one["method"] == "Network.requestWillBeSent"]
-        found = [one["params"]["request"]["url"] for one in sent]
-        return [address for address in found if not address.startswith("data:")]
+        values = [one["params"]["request"]["url"] for one in sent]
+        return [address for address in values if not address.startswith("data:")]
 
     def complaints(self) -> list[dict[str, Any]]:
         """What the browser has to say: log, console, exceptions, and issues such as of the CSP."""
@@ -151,6 +151,6 @@ class Browser:
 
 def _is_loaded(event: dict[str, Any], loader: str) -> bool:
     """Whether an event is the end of this load, not of the page before."""
-    found = event["params"]
-    is_load = event["method"] == "Page.lifecycleEvent" and found["name"] == "load"
-    return bool(is_load and found["loaderId"] == loader)
+    params = event["params"]
+    is_load = event["method"] == "Page.lifecycleEvent" and params["name"] == "load"
+    return bool(is_load and params["loaderId"] == loader)

@@ -283,6 +283,6 @@ def mixed(nx: int, ny: int, kind: int) -> tuple[Floats, Ints]:
 
 def displacement(state: RodState) -> Floats:
     """Displacement of every dof."""
-    found = state.deformation
-    found[::2] += state.tip
-    return found
+    deformation = state.deformation
+    deformation[::2] += state.tip
+    return deformation

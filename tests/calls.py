@@ -106,9 +106,9 @@ def new(*options: str | Path) -> Done:
 
 def new_deck(*options: str | Path) -> Deck:
     """Deck that ``fecm new`` writes."""
-    made = new(*options)
-    assert made.exit_code == 0, made.stderr
-    return fecm.read_one(made.stdout)
+    answer = new(*options)
+    assert answer.exit_code == 0, answer.stderr
+    return fecm.read_one(answer.stdout)
 
 
 def rows(done: Done) -> list[dict[str, str]]:

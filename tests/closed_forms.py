@@ -330,7 +330,7 @@ def two_bodies(time: float) -> tuple[float, ...]:
         F, resistance = force(y), a * plate * y[3]
         return [y[1], -F / mass, y[3], (F - resistance) / plate, resistance * y[3]]
 
-    found = solve_ivp(
+    solution = solve_ivp(
         rate,
         (0.0, time),
         [0.0, 100.0, 0.0, 0.0, 0.0],
@@ -339,7 +339,7 @@ def two_bodies(time: float) -> tuple[float, ...]:
         atol=1e-15,
         events=lambda _, y: y[1] - y[3],
     )
-    return force(found.y_events[0][0]), -found.y[1, -1], found.y[2, -1], found.y[4, -1]
+    return force(solution.y_events[0][0]), -solution.y[1, -1], solution.y[2, -1], solution.y[4, -1]
 
 
 def indentation() -> tuple[float | None, ...]:

@@ -140,8 +140,8 @@ def exposures() -> list[float]:
             turned_stiffness(CARBON, angle) @ (STATE[:3] + z * STATE[3:]) for z in (low, high)
         ]
         R = turn(angle)
-        own = [R @ np.array([[s[0], s[2]], [s[2], s[1]]]) @ R.T for s in stresses]
-        states.append([np.array([s[0, 0], s[1, 1], s[0, 1]]) for s in own])
+        values = [R @ np.array([[s[0], s[2]], [s[2], s[1]]]) @ R.T for s in stresses]
+        states.append([np.array([s[0, 0], s[1, 1], s[0, 1]]) for s in values])
     return [
         max(exposure(index, stress) for stress in faces)
         for index in (max_stress, tsai_wu, hashin, puck)
@@ -156,12 +156,12 @@ def interlaminar() -> list[float]:
     """
     stresses = shear_stresses(CARBON, ANGLES, H, BY_X, BY_Y)
     left = np.array([tau(H / 2.0) for tau in stresses[-1]])
-    found = []
+    values = []
     for number, (_, z, _) in enumerate(plies(ANGLES, H)[:-1]):
         tau = np.array([one(z) for one in stresses[number]]) - left * (z / H + 0.5)
         beside = [turn(angle) @ tau for angle in ANGLES[number : number + 2]]
-        found.append(max(math.hypot(t13 / S13, t23 / S23) for t13, t23 in beside))
-    return found
+        values.append(max(math.hypot(t13 / S13, t23 / S23) for t13, t23 in beside))
+    return values
 
 
 # Residual stresses -------------------------------------------------------------------------------

@@ -102,13 +102,13 @@ def pulsed_square(n: int, pressure: float, end: float, duration: float = 20e-6) 
         model.Nonlinear(),
         decks.material(ISOTROPIC, [0.0], 1.0),
     )
-    made = decks.deck(grid, segments, ())
-    critical = 0.9 * critical_time_step(build_plate(made, generate(made)))
+    text = decks.deck(grid, segments, ())
+    critical = 0.9 * critical_time_step(build_plate(text, generate(text)))
     # The first step accelerates for half a step: the pulse ends in the middle of one.
     dt = duration / (math.ceil(duration / critical - 0.5) + 0.5)
     program = f"LMAS DT={dt!r} PROP=1 LOOP={round(end / dt)} TIME EXCD DISP=50 NEXT"
     table = LoadTable(1, 1, 0.0, duration, (1.0, 0.0, 0.0, 0.0, 0.0))
-    return replace(made, macros=decks.program(program), tables=(table,))
+    return replace(text, macros=decks.program(program), tables=(table,))
 
 
 def disc_mesh(radius: float, core: int, rings: int) -> tuple[Floats, Ints]:

@@ -90,10 +90,10 @@ def schema_of(kind: Any, defs: dict[str, Schema]) -> Schema | bool:
     if kind in PLAIN:
         return PLAIN[kind]
     if origin in (Union, UnionType):
-        found = [schema_of(one, defs) for one in arguments]
-        if all(isinstance(one, dict) and one.keys() == {"type"} for one in found):
-            return {"type": [one["type"] for one in found if isinstance(one, dict)]}
-        return {"anyOf": found}
+        values = [schema_of(one, defs) for one in arguments]
+        if all(isinstance(one, dict) and one.keys() == {"type"} for one in values):
+            return {"type": [one["type"] for one in values if isinstance(one, dict)]}
+        return {"anyOf": values}
     if origin is Literal:
         return {"enum": list(arguments)} if len(arguments) > 1 else {"const": arguments[0]}
     if origin is tuple and Ellipsis not in arguments:
@@ -116,23 +116,23 @@ def schema_of(kind: Any, defs: dict[str, Schema]) -> Schema | bool:
 
 def annotated(kind: Any, notes: Sequence[Any], defs: dict[str, Schema]) -> Schema | bool:
     """Schema of a type with metadata."""
-    found: Any = None
+    schema: Any = None
     description = {}
     for note in notes:
         match note:
             case str():
                 description = {"description": note}
             case re.Pattern():
-                found = {**TEXT, "pattern": note.pattern}
+                schema = {**TEXT, "pattern": note.pattern}
             case tuple():
-                found = {"type": "number"}
+                schema = {"type": "number"}
                 for count in reversed(note):
-                    found = array(found, count)
+                    schema = array(schema, count)
             case _:
-                found = schema_of(note, defs)
-    if found is None:
-        found = schema_of(kind, defs)
-    return {**description, **found} if description else found
+                schema = schema_of(note, defs)
+    if schema is None:
+        schema = schema_of(kind, defs)
+    return {**description, **schema} if description else schema
 
 
 def array(items: Schema | bool, count: int | None = None) -> Schema:
@@ -149,10 +149,10 @@ def of_fields(kind: type, defs: dict[str, Schema]) -> Schema:
     described = {} if is_typeddict(kind) else attributes(kind)
     properties: dict[str, Any] = {}
     for name, hint in {**others, **hints}.items():
-        found = schema_of(hint, defs)
-        if name in described and isinstance(found, dict):
-            found = {"description": described[name], **found}
-        properties[name] = found
+        schema = schema_of(hint, defs)
+        if name in described and isinstance(schema, dict):
+            schema = {"description": described[name], **schema}
+        properties[name] = schema
     more = {"additionalProperties": schema_of(FURTHER[kind], defs)} if kind in FURTHER else {}
     return {
         "type": "object",
@@ -166,11 +166,11 @@ def text_of(name: str) -> str:
     """Text of the schema of an output."""
     title, kinds = OUTPUTS[name]
     defs: dict[str, Schema] = {}
-    found = [schema_of(kind, defs) for kind in kinds]
+    values = [schema_of(kind, defs) for kind in kinds]
     schema = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": title,
-        "oneOf": found,
+        "oneOf": values,
         "$defs": {**dict(sorted(defs.items())), "number": NUMBER},
     }
     return json.dumps(schema, indent=2) + "\n"

@@ -29,11 +29,11 @@ HELD = {
 
 def documented(page: str) -> dict[str, tuple[Any, str]]:
     """Names on a page: what they are, and the options of their directives."""
-    found = {}
+    by_name = {}
     for path, options in DIRECTIVE.findall(page):
         module, _, name = path.rpartition(".")
-        found[path] = getattr(import_module(module), name), options
-    return found
+        by_name[path] = getattr(import_module(module), name), options
+    return by_name
 
 
 def shown(found: Any, options: str) -> Iterator[Any]:
@@ -74,7 +74,7 @@ def lacking(page: str) -> dict[str, str]:
     """Types without an entry on a page, and a signature that names each."""
     entries = documented(page)
     classes = {one for one, _ in entries.values() if inspect.isclass(one)}
-    found = {}
+    by_name = {}
     for one, options in entries.values():
         for function in shown(one, options):
             for annotation in getattr(function, "__annotations__", {}).values():
@@ -82,8 +82,8 @@ def lacking(page: str) -> dict[str, str]:
                     kind = named_in(function.__module__)
                     if name in kind and kind[name] not in classes:
                         full = f"{kind[name].__module__}.{name}"
-                        found[full] = function.__qualname__
-    return {name: where for name, where in found.items() if name not in HELD}
+                        by_name[full] = function.__qualname__
+    return {name: where for name, where in by_name.items() if name not in HELD}
 
 
 PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")

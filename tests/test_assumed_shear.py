@@ -145,8 +145,8 @@ def test_a_thin_plate_bends_as_accurately_as_a_thick_one(
 ) -> None:
     exact = navier(h)
     for n, error in errors.items():
-        found = centre(supported(square(n, n, kind), h)) / exact - 1.0
-        assert 0.8 * error < abs(found) < error
+        value = centre(supported(square(n, n, kind), h)) / exact - 1.0
+        assert 0.8 * error < abs(value) < error
 
 
 def navier(h: float) -> float:

@@ -79,15 +79,15 @@ def test_what_is_no_layup_is_refused(text: str) -> None:
 
 
 def test_the_reports_numbers_give_the_reports_deck() -> None:
-    made = new(*REPORT)
-    assert made.exit_code == 0
-    assert fecm.read_deck(made.stdout) == fecm.read_deck(LONG)
+    answer = new(*REPORT)
+    assert answer.exit_code == 0
+    assert fecm.read_deck(answer.stdout) == fecm.read_deck(LONG)
 
 
 def test_a_new_deck_is_sound_and_declares_its_units() -> None:
-    made = new(*PLATE)
-    assert made.exit_code == 0
-    prepared = load_deck(made.stdout)
+    answer = new(*PLATE)
+    assert answer.exit_code == 0
+    prepared = load_deck(answer.stdout)
     assert prepared.errors() == []
     deck = prepared.problems[0].deck
     assert deck.control == Control(117, 24, 4, 2, 5, 9)
@@ -96,7 +96,7 @@ def test_a_new_deck_is_sound_and_declares_its_units() -> None:
     assert material.integration.thickness == 1e-3
     assert deck.require(Impact).node == 59  # the middle of 13 x 9 nodes
     dt = next(m.value for m in deck.macros if m.word == "DT")
-    critical = load_deck(made.stdout).problems[0]
+    critical = load_deck(answer.stdout).problems[0]
     from fecm.problem.parts import build_plate
 
     ratio = dt / critical_time_step(build_plate(critical.deck, critical.mesh))
@@ -122,13 +122,13 @@ EQUI = Shear(assumed=True, equilibrium=True)
 def test_a_new_deck_has_patch_and_assumed_shear_and_says_so_in_a_line(
     options: list[str], patch: Patch | None, shear: Shear | None, note: str
 ) -> None:
-    made = new(*PLATE, *options)
-    deck = fecm.read_one(made.stdout)
+    answer = new(*PLATE, *options)
+    deck = fecm.read_one(answer.stdout)
     assert (deck.last(Patch), deck.last(Shear)) == (patch, shear)
-    notes = [line for line in made.stderr.splitlines() if line.startswith("fecm: note")]
+    notes = [line for line in answer.stderr.splitlines() if line.startswith("fecm: note")]
     assert sum("SHEA MITC" in line or "PATC" in line for line in notes) == bool(note)
     assert note in "".join(notes)
-    assert "W447" not in made.stderr
+    assert "W447" not in answer.stderr
 
 
 @pytest.mark.parametrize("options", [[], ["--grading", "2"]])
@@ -143,10 +143,10 @@ def test_a_mesh_is_obeyed_whatever_the_radius_of_the_patch(options: list[str]) -
 
 @pytest.mark.parametrize("options", [["--patch", "disc:0.2"], ["--at", "0,0.1"]])
 def test_a_patch_beyond_an_edge_is_refused_with_the_way_out(options: list[str]) -> None:
-    made = new(*PLATE, *options)
-    assert (made.exit_code, made.stdout) == (2, "")
-    assert "E445" in made.stderr
-    assert "fecm new --patch none" in made.stderr
+    answer = new(*PLATE, *options)
+    assert (answer.exit_code, answer.stdout) == (2, "")
+    assert "E445" in answer.stderr
+    assert "fecm new --patch none" in answer.stderr
 
 
 @settings(max_examples=30)
@@ -203,8 +203,8 @@ def test_a_coupled_laminate_keeps_its_in_plane_unknowns() -> None:
     ],
 )  # fmt: skip
 def test_options_that_cannot_be_meant_exit_2(options: list[str]) -> None:
-    made = new(*PLATE, *options)
-    assert_unusable(made)
+    answer = new(*PLATE, *options)
+    assert_unusable(answer)
 
 
 def test_a_new_deck_never_replaces_an_old_one_unasked(tmp_path: Path) -> None:
@@ -283,8 +283,8 @@ def test_formatting_keeps_fields_blank_whose_default_is_not_zero(cards: str) -> 
 
 def test_a_formatted_deck_runs_to_the_same_tapes(tmp_path: Path) -> None:
     formatted = tmp_path / "formatted.inp"
-    made = call("fmt", str(APPENDIX), "-o", str(formatted))
-    assert made.exit_code == 0
+    answer = call("fmt", str(APPENDIX), "-o", str(formatted))
+    assert answer.exit_code == 0
     for path in (APPENDIX, formatted):
         out = tmp_path / f"{path.stem}.h5"
         assert call("run", str(path), "-o", str(out)).exit_code == 0
@@ -367,17 +367,17 @@ def test_a_moved_impact_point_is_named_with_both_points_and_their_distance() -> 
 
 def test_a_new_deck_shows_the_warnings_that_check_shows(tmp_path: Path) -> None:
     deck = tmp_path / "plate.inp"
-    made = call("new", str(deck), *PLATE, "--velocity", "3000")
-    assert made.exit_code == 0
+    answer = call("new", str(deck), *PLATE, "--velocity", "3000")
+    assert answer.exit_code == 0
     shown = [f.render(str(deck)) for f in load_deck(deck).findings]
     assert {"W415", "W435"} <= {f.code for f in load_deck(deck).findings}
-    assert all(text in made.stderr for text in shown)
+    assert all(text in answer.stderr for text in shown)
 
 
 def test_numbers_of_another_system_of_units_are_named_for_the_units_declared() -> None:
     si = "1580,.32,161e9,11.4e9,5.17e9,5.17e9,3.98e9"
     cut = PLATE.index("--material")
     options = [*PLATE[:cut], *PLATE[cut + 4 :], "--ply", si, "--units", "mm-N-s"]
-    made = new(*options)
-    assert "W435" in made.stderr
-    assert "mass density 1580 is 1.58e+15 kg/m^3" in made.stderr
+    answer = new(*options)
+    assert "W435" in answer.stderr
+    assert "mass density 1580 is 1.58e+15 kg/m^3" in answer.stderr

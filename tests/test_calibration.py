@@ -27,11 +27,11 @@ def outputs(noise: float = 0.0, offset: float = 0.0, seed: int = 0) -> tuple[Flo
 
 
 def test_a_clean_test_gives_the_sensitivity_it_was_made_with() -> None:
-    found = calibrate_transducer(*outputs(offset=3.0), MASS, C_A)
-    assert found.sensitivity == pytest.approx(C_F, rel=1e-12)
-    assert found.offset == pytest.approx(3.0, rel=1e-10)
-    assert found.r_squared == pytest.approx(1.0, abs=1e-12)
-    assert found.sensitivity_error < 1e-10
+    calibration = calibrate_transducer(*outputs(offset=3.0), MASS, C_A)
+    assert calibration.sensitivity == pytest.approx(C_F, rel=1e-12)
+    assert calibration.offset == pytest.approx(3.0, rel=1e-10)
+    assert calibration.r_squared == pytest.approx(1.0, abs=1e-12)
+    assert calibration.sensitivity_error < 1e-10
 
 
 @pytest.mark.parametrize("through_origin", [False, True])
@@ -41,8 +41,8 @@ def test_noise_leaves_the_truth_inside_the_standard_error_as_often_as_it_should(
     missed = []
     for seed in range(400):
         v_f, v_a = outputs(0.01, seed=seed)
-        found = calibrate_transducer(v_f, v_a, MASS, C_A, through_origin=through_origin)
-        missed.append(abs(found.sensitivity - C_F) / found.sensitivity_error)
+        calibration = calibrate_transducer(v_f, v_a, MASS, C_A, through_origin=through_origin)
+        missed.append(abs(calibration.sensitivity - C_F) / calibration.sensitivity_error)
     # 68.3 % of a normal variable lie inside one standard error, 95.4 % inside two.
     assert np.mean(np.array(missed) < 1.0) == pytest.approx(0.683, abs=0.06)
     assert np.mean(np.array(missed) < 2.0) == pytest.approx(0.954, abs=0.03)
@@ -50,12 +50,12 @@ def test_noise_leaves_the_truth_inside_the_standard_error_as_often_as_it_should(
 
 def test_the_error_is_that_of_the_textbooks_example() -> None:
     # By hand: x = 0, 1, 2, 3 and y = 0, 1, 1, 2 give 0.6 x + 0.1 with residuals -.1, .3, -.3, .1.
-    found = calibrate_transducer(np.array([0.0, 1, 1, 2]), np.array([0.0, 1, 2, 3]), 1.0, 1.0)
-    assert found.slope == pytest.approx(0.6)
-    assert found.offset == pytest.approx(0.1)
-    assert found.slope_error == pytest.approx(np.sqrt(0.2 / 2 / 5))
-    assert found.offset_error == pytest.approx(np.sqrt(0.1 * (1 / 4 + 1.5**2 / 5)))
-    assert found.r_squared == pytest.approx(1.0 - 0.2 / 2.0)
+    calibration = calibrate_transducer(np.array([0.0, 1, 1, 2]), np.array([0.0, 1, 2, 3]), 1.0, 1.0)
+    assert calibration.slope == pytest.approx(0.6)
+    assert calibration.offset == pytest.approx(0.1)
+    assert calibration.slope_error == pytest.approx(np.sqrt(0.2 / 2 / 5))
+    assert calibration.offset_error == pytest.approx(np.sqrt(0.1 * (1 / 4 + 1.5**2 / 5)))
+    assert calibration.r_squared == pytest.approx(1.0 - 0.2 / 2.0)
 
 
 def test_the_command_prints_the_sensitivity_for_persons_and_for_programs(tmp_path: Path) -> None:
@@ -64,10 +64,10 @@ def test_the_command_prints_the_sensitivity_for_persons_and_for_programs(tmp_pat
     lines = [f"{n}e-6,{a:.17g},{f:.17g}" for n, (f, a) in enumerate(zip(v_f, v_a, strict=True))]
     path.write_text("time (s),V_a (mV),V_F (mV)\n" + "\n".join(lines) + "\n")
     options = (path, "--mass", MASS, "--c-a", C_A)
-    found = json.loads(call("rod", "calibrate", *options, "--format", "json").stdout)
-    assert abs(found["sensitivity"] - C_F) < 3 * found["sensitivity_error"]
+    document = json.loads(call("rod", "calibrate", *options, "--format", "json").stdout)
+    assert abs(document["sensitivity"] - C_F) < 3 * document["sensitivity_error"]
     told = call("rod", "calibrate", *options).stdout.splitlines()
-    assert told[-1].startswith(f"sensitivity c_F   {found['sensitivity']:.6g} ± ")
+    assert told[-1].startswith(f"sensitivity c_F   {document['sensitivity']:.6g} ± ")
 
 
 @pytest.mark.parametrize(

@@ -98,8 +98,8 @@ def test_listing_mode_refuses_words_that_the_printed_program_lacks(
     cards: str, words: list[str]
 ) -> None:
     findings = load_deck(small(data=cards + DATA_CARDS), "listing").findings
-    found = [f.message for f in findings if f.code == "E603"]
-    assert found == [f"The printed program has no {word}." for word in words]
+    values = [f.message for f in findings if f.code == "E603"]
+    assert values == [f"The printed program has no {word}." for word in words]
 
 
 def test_five_independent_errors_are_five_findings_in_one_run() -> None:
@@ -269,8 +269,8 @@ def test_the_reports_rod_is_a_note_of_one_line_in_a_deck_of_its_units(units: str
 
 @pytest.mark.parametrize("units", ["mm N s", "in kip s", "in lbf ms", "furlong lbf s"])
 def test_the_reports_rod_is_a_warning_in_a_deck_of_other_units(units: str) -> None:
-    found = load_deck(small(data=f"UNIT\n{units}\n" + DATA_CARDS)).findings
-    (warning,) = (finding for finding in found if finding.code in ("N414", "W414"))
+    findings = load_deck(small(data=f"UNIT\n{units}\n" + DATA_CARDS)).findings
+    (warning,) = (finding for finding in findings if finding.code in ("N414", "W414"))
     assert warning.severity == "warning"
 
 

@@ -39,14 +39,16 @@ def table(path: Path, head: str, time: Any, force: Any) -> Path:
 
 def test_a_measurement_of_ten_percent_more_has_the_errors_of_closed_form() -> None:
     time = np.linspace(-0.5, 1.5, 4001)
-    found = half_sine().compare((time, 11.0 * np.sin(np.pi * time)))
-    assert (found.begin, found.end) == pytest.approx((0.0, 1.0), abs=1e-3)
-    assert (found.peak, found.measured_peak) == pytest.approx((10.0, 11.0), rel=1e-5)
+    comparison = half_sine().compare((time, 11.0 * np.sin(np.pi * time)))
+    assert (comparison.begin, comparison.end) == pytest.approx((0.0, 1.0), abs=1e-3)
+    assert (comparison.peak, comparison.measured_peak) == pytest.approx((10.0, 11.0), rel=1e-5)
     both = (20.0 / math.pi, 22.0 / math.pi)
-    assert (found.impulse, found.measured_impulse) == pytest.approx(both, rel=1e-4)
-    assert found.rms == pytest.approx(1.0 / math.sqrt(2.0), rel=1e-3)
-    assert found.correlation == pytest.approx(1.0, abs=1e-6)
-    assert "peak 10 against 11 lbf (-9.1%), impulse 6.366 against 7.003 lbf*s (-9.1%)" in str(found)
+    assert (comparison.impulse, comparison.measured_impulse) == pytest.approx(both, rel=1e-4)
+    assert comparison.rms == pytest.approx(1.0 / math.sqrt(2.0), rel=1e-3)
+    assert comparison.correlation == pytest.approx(1.0, abs=1e-6)
+    assert "peak 10 against 11 lbf (-9.1%), impulse 6.366 against 7.003 lbf*s (-9.1%)" in str(
+        comparison
+    )
 
 
 def test_a_late_measurement_is_correlated_as_the_cosine_of_its_delay() -> None:
@@ -61,8 +63,8 @@ def test_a_late_measurement_is_correlated_as_the_cosine_of_its_delay() -> None:
 def test_a_delay_and_an_offset_of_the_measurement_are_subtracted() -> None:
     time = np.linspace(0.0, 2.0, 4001)
     force = 3.0 + np.where(time < 0.25, 0.0, 10.0 * np.sin(np.pi * (time - 0.25)))
-    found = half_sine().compare((time, force), delay=0.25, offset=3.0)
-    assert found.rms == pytest.approx(0.0, abs=1e-4)
+    comparison = half_sine().compare((time, force), delay=0.25, offset=3.0)
+    assert comparison.rms == pytest.approx(0.0, abs=1e-4)
     assert half_sine().compare((time, force)).rms > 3.0
     with pytest.raises(StudyError, match="must be finite"):
         half_sine().compare((time, force), delay=math.nan)
@@ -95,10 +97,10 @@ def test_the_header_says_what_a_file_is_compared_with(
     time = np.linspace(0.0, 1.0, 101)
     columns = (time, factor * 10.0 * np.sin(np.pi * time))
     file = table(tmp_path / "m.csv", head, *(columns[::-1] if "Time" in head else columns))
-    found = half_sine().compare(file)
-    assert found.points == 101
-    assert found.rms == pytest.approx(0.0, abs=1e-4)
-    assert found.peak == pytest.approx(factor * 10.0)
+    comparison = half_sine().compare(file)
+    assert comparison.points == 101
+    assert comparison.rms == pytest.approx(0.0, abs=1e-4)
+    assert comparison.peak == pytest.approx(factor * 10.0)
 
 
 @pytest.mark.parametrize(
@@ -154,10 +156,10 @@ def test_files_of_test_rigs_are_read_as_they_are(tmp_path: Path, form: str) -> N
     ]
     text = "\n".join([head, *rows])
     (tmp_path / "rig.csv").write_text(text.replace(".", ",") if "Zeit" in head else text)
-    found = half_sine().compare(tmp_path / "rig.csv")
-    assert found.points == 101
-    assert found.measured_peak == pytest.approx(10.0)
-    assert found.rms == pytest.approx(0.0, abs=1e-4)
+    comparison = half_sine().compare(tmp_path / "rig.csv")
+    assert comparison.points == 101
+    assert comparison.measured_peak == pytest.approx(10.0)
+    assert comparison.rms == pytest.approx(0.0, abs=1e-4)
 
 
 def test_columns_and_units_of_a_measurement_are_chosen(tmp_path: Path) -> None:
@@ -169,8 +171,8 @@ def test_columns_and_units_of_a_measurement_are_chosen(tmp_path: Path) -> None:
     file = tmp_path / "rig.csv"
     file.write_text("a,channel 2,clock\n" + rows)
     for columns in (("clock", "channel 2"), ("3", "2")):
-        found = half_sine().compare(file, columns=columns, units=("ms", "kN"))
-        assert found.rms == pytest.approx(0.0, abs=1e-4)
+        comparison = half_sine().compare(file, columns=columns, units=("ms", "kN"))
+        assert comparison.rms == pytest.approx(0.0, abs=1e-4)
     pair = (1e3 * time, 4.4482216152605e-3 * 10.0 * np.sin(np.pi * time))
     assert half_sine().compare(pair, units=("ms", "kN")).rms == pytest.approx(0.0, abs=1e-4)
     with pytest.raises(StudyError, match="`columns` of time and force selects others"):

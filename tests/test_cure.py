@@ -157,8 +157,8 @@ def bent(load: float, dt: float) -> fecm.Result:
 def test_the_first_ply_fails_at_the_load_of_the_exact_solution(row: dict[str, str]) -> None:
     name, dt = NAMES[row["criterion"]], float(row["dT_K"])
     expected = float(row["q0 at first failure (Pa)"])
-    found = bent(expected, dt)
-    (one,) = [one for one in largest_exposures(found) if one.criterion == name]
+    bent_plate = bent(expected, dt)
+    (one,) = [one for one in largest_exposures(bent_plate) if one.criterion == name]
     assert one.at_rest == pytest.approx(float(row[ALONE]), abs=1e-6)
     load = expected / one.exposure if one.load_factor is None else expected * one.load_factor
     assert load == pytest.approx(expected, rel=2e-3)
@@ -197,15 +197,15 @@ def cooled(dt: float, every: int = 1) -> Deck:
 
 
 def test_fail_judges_the_sum_of_residual_and_mechanical_stresses() -> None:
-    found = fecm.run_one(cooled(-100.0))
+    result = fecm.run_one(cooled(-100.0))
     ((card, *_),) = strengths_of_deck(fecm.read_one(failing()))
     assert card is not None
     (problem,) = load_deck(cooled(-100.0)).problems
     assert problem.residual is not None
     stresses = problem.residual.stresses
-    np.testing.assert_allclose(found["plies/cure_stress"], stresses, rtol=1e-15)
+    np.testing.assert_allclose(result["plies/cure_stress"], stresses, rtol=1e-15)
     plies = PlyStresses(problem.mesh, problem.laminate, problem.rules[2])
-    rows = [plies.evaluate(field) for field in found["tape3/displacement"]]
+    rows = [plies.evaluate(field) for field in result["tape3/displacement"]]
     rows.append({name: 0.0 * rows[0][name] for name in ("sigma_1", "sigma_2", "tau_12")})
     for name, criterion in CRITERIA.items():
         exposures = [
@@ -213,17 +213,17 @@ def test_fail_judges_the_sum_of_residual_and_mechanical_stresses() -> None:
             for row in rows
         ]
         largest = np.max(exposures, axis=0)
-        np.testing.assert_allclose(found[f"failure/{name}/exposure"], largest, rtol=1e-11)
+        np.testing.assert_allclose(result[f"failure/{name}/exposure"], largest, rtol=1e-11)
         at_rest = float(exposures[-1].max())
-        assert found.failure.attributes["cure"] == -100.0
-        about = found.attributes_of(f"failure/{name}")
+        assert result.failure.attributes["cure"] == -100.0
+        about = result.attributes_of(f"failure/{name}")
         assert about["at_rest"] == pytest.approx(at_rest, rel=1e-12)
 
 
 def test_motion_force_and_stresses_between_plies_do_not_depend_on_the_cure() -> None:
     cold, plain = fecm.run_one(struck(-6.0)), fecm.run_one(struck(0.0))
-    own = [path for path in plain if path.startswith(("history", "energy", "tape"))]
-    for path in (*own, "failure/interlaminar/exposure", "failure/interlaminar/time"):
+    values = [path for path in plain if path.startswith(("history", "energy", "tape"))]
+    for path in (*values, "failure/interlaminar/exposure", "failure/interlaminar/time"):
         np.testing.assert_array_equal(cold[path], plain[path], err_msg=path)
 
 
@@ -279,8 +279,8 @@ def test_summary_and_json_have_what_the_residual_stresses_contribute(tmp_path: P
     assert one.at_rest is not None
     assert one.load_factor is not None
     assert f"; at rest {one.at_rest:.3g}, 1 at {one.load_factor:.4g} of the load's" in line
-    told = json.loads(call("info", tmp_path / "d.h5", "--format", "json").stdout)
-    failure = told["metrics"]["failure"]
+    document = json.loads(call("info", tmp_path / "d.h5", "--format", "json").stdout)
+    failure = document["metrics"]["failure"]
     assert failure["at_rest"]["tsai_wu"] == pytest.approx(one.at_rest)
     assert failure["load_factor"]["tsai_wu"] == pytest.approx(one.load_factor)
     assert "interlaminar" not in failure["at_rest"]
@@ -299,8 +299,8 @@ def test_the_factor_acts_on_the_load_alone_under_a_preload() -> None:
     def largest(load: float) -> LargestExposure:
         others = [decks.MITC, STRENGTHS, Preload(2e5, 1e5), Cure(-50.0, expansions=(ALPHA,))]
         macros = decks.program("TANG FORM SOLV FAIL")
-        made = decks.quarter_plate(4, plate, macros, load * along, further=others)
-        return largest_exposures(decks.run_of_deck(made))[0]
+        quarter = decks.quarter_plate(4, plate, macros, load * along, further=others)
+        return largest_exposures(decks.run_of_deck(quarter))[0]
 
     one = largest(5e4)
     assert one.load_factor is not None
@@ -311,11 +311,13 @@ def test_the_factor_acts_on_the_load_alone_under_a_preload() -> None:
 
 
 def test_a_run_begins_with_the_exposures_at_rest() -> None:
-    found = fecm.run_one(cooled(-100.0, every=3))
-    at_rest = [found.attributes_of(f"failure/{name}")["at_rest"] for name in CRITERIA]
-    assert found["exposures/time"][0] == 0.0
-    np.testing.assert_allclose(found["exposures/exposure"][0, : len(CRITERIA)], at_rest, rtol=1e-12)
-    assert (np.diff(found["exposures/exposure"][:, : len(CRITERIA)], axis=0) >= 0.0).all()
+    result = fecm.run_one(cooled(-100.0, every=3))
+    at_rest = [result.attributes_of(f"failure/{name}")["at_rest"] for name in CRITERIA]
+    assert result["exposures/time"][0] == 0.0
+    np.testing.assert_allclose(
+        result["exposures/exposure"][0, : len(CRITERIA)], at_rest, rtol=1e-12
+    )
+    assert (np.diff(result["exposures/exposure"][:, : len(CRITERIA)], axis=0) >= 0.0).all()
 
 
 # Sweeps and searches -----------------------------------------------------------------------------
@@ -333,14 +335,14 @@ def struck(dt: float) -> Deck:
 @pytest.mark.few(1)  # of 2, 0.6 s each
 def test_cases_of_a_sweep_are_the_runs_of_their_decks(values: dict[str, list[float]]) -> None:
     deck = struck(-1.0)
-    found = fecm.sweep(deck, values, measure="failure")
-    for row in range(len(found["cure_dT"])):
-        single = fecm.run_one(deck.with_(**{name: found[name][row] for name in values}))
+    swept = fecm.sweep(deck, values, measure="failure")
+    for row in range(len(swept["cure_dT"])):
+        single = fecm.run_one(deck.with_(**{name: swept[name][row] for name in values}))
         largest = {f"exposure_{one.criterion}": one.exposure for one in largest_exposures(single)}
-        columns = {name: found[name][row] for name in EXPOSURES if name in largest}
+        columns = {name: swept[name][row] for name in EXPOSURES if name in largest}
         assert columns == pytest.approx(largest, rel=1e-9)
-        assert found["peak_force"][row] == pytest.approx(single.force.max(), rel=1e-9)
-        assert found["validity"][row] == single.validity
+        assert swept["peak_force"][row] == pytest.approx(single.force.max(), rel=1e-9)
+        assert swept["validity"][row] == single.validity
 
 
 @pytest.mark.long
@@ -361,9 +363,9 @@ def test_cases_that_differ_in_the_cure_alone_share_their_motion(
     told = "16 draws are run in full; those that differ only in cure_dT, together"
     assert told in done.stderr
     assert len(runs) == 1
-    found = fecm.load_sweep(tmp_path / "s.h5")
-    assert len(set(found["exposure_tsai_wu"])) == 16
-    assert len(set(found["peak_force"])) == 1
+    swept = fecm.load_sweep(tmp_path / "s.h5")
+    assert len(set(swept["exposure_tsai_wu"])) == 16
+    assert len(set(swept["peak_force"])) == 1
     # Without exposures all cases are that of the plate.
     with pytest.warns(fecm.FecmWarning, match="cure_dT changes only exposures"):
         forces = fecm.sweep(struck(0.0), {"cure_dT": [-3.0, 0.0]})["peak_force"]
@@ -390,10 +392,10 @@ def test_a_deck_without_expansions_can_not_vary_the_cure() -> None:
 
 
 def test_the_first_failure_begins_with_the_exposure_at_rest() -> None:
-    found = fecm.run_one(struck(-6.0))
-    first = next(one for one in found.first_failures if one.criterion in CRITERIA)
+    result = fecm.run_one(struck(-6.0))
+    first = next(one for one in result.first_failures if one.criterion in CRITERIA)
     number = list(ALL_CRITERIA).index(first.criterion)
-    times, exposures = found["exposures/time"], found["exposures/exposure"][:, number]
+    times, exposures = result["exposures/time"], result["exposures/exposure"][:, number]
     assert exposures[0] > 0.5
     after = int(np.argmax(exposures >= 1.0))
     share = (1.0 - exposures[after - 1]) / (exposures[after] - exposures[after - 1])
@@ -424,9 +426,9 @@ NEW = (
 )
 @pytest.mark.few(2)  # of 5, 0.1 s each
 def test_new_writes_the_cure_of_a_named_ply(name: str, cure: str, dt: float) -> None:
-    made = call(*NEW, "--material", name, "--cure", cure)
-    assert made.exit_code == 0, made.stderr
-    card = fecm.read_one(made.stdout).require(Cure)
+    answer = call(*NEW, "--material", name, "--cure", cure)
+    assert answer.exit_code == 0, answer.stderr
+    card = fecm.read_one(answer.stdout).require(Cure)
     values = MATERIALS[name].values
     expected = Expansion(1, values["alpha1"], values["alpha2"])
     assert card == Cure(dt, expansions=(expected,))
@@ -437,7 +439,7 @@ def test_new_writes_the_cure_of_a_named_ply(name: str, cure: str, dt: float) -> 
         fecm.Contact(5e4, 0.0, 0.0, 1.5),
         velocity=2000.0, duration=1e-5, units="mm-N-s", patch=None, damage=True, cure=cure,
     )  # fmt: skip
-    assert deck == fecm.read_one(made.stdout)
+    assert deck == fecm.read_one(answer.stdout)
 
 
 @pytest.mark.parametrize(
@@ -483,8 +485,8 @@ OWN = "[mine]\ndensity=1.6e-9\nnu12=0.3\nE1=140e3\nE2=9e3\nG12=5e3\n{}\n"
 
 def messages(card: Cure) -> dict[str, str]:
     """Findings about a card on the small plate, by code."""
-    found = load_deck(with_cure(card)).findings
-    return {f.code: f.message for f in found if f.code in CODES}
+    findings = load_deck(with_cure(card)).findings
+    return {f.code: f.message for f in findings if f.code in CODES}
 
 
 CODES = ("E453", "E454", "W462", "W463", "W464", "W465", "W496")
@@ -516,5 +518,5 @@ def test_what_is_wrong_with_a_cure_is_told(card: Cure, code: str, message: str) 
 def test_a_sound_cure_has_no_findings() -> None:
     deck = replace(fecm.read_one(base()), text="")
     cold = Cure(-155.0, expansions=(ALPHA,))
-    made = replace(deck, segments=(*deck.segments, cold))
-    assert [f.code for f in load_deck(made).findings if f.code in CODES] == []
+    changed = replace(deck, segments=(*deck.segments, cold))
+    assert [f.code for f in load_deck(changed).findings if f.code in CODES] == []

@@ -104,10 +104,10 @@ def test_a_radius_near_the_thickness_is_no_thin_shell() -> None:
 )
 def test_a_clamped_membrane_is_doubted(every: str, words: str) -> None:
     held = " ".join(every + code for code in ("000", "101", "110", "101", "110"))
-    found = findings(panel((500.0,), STATIC, load=1.0, codes=held))
-    assert ("W526" in found) == bool(words)
+    deck_findings = findings(panel((500.0,), STATIC, load=1.0, codes=held))
+    assert ("W526" in deck_findings) == bool(words)
     if words:
-        assert f"CURV, and {words} restrained at every node" in found["W526"].message
+        assert f"CURV, and {words} restrained at every node" in deck_findings["W526"].message
         flat = findings(panel((), STATIC, load=1.0, codes=held))
         assert "W526" not in flat
 

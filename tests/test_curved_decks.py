@@ -188,15 +188,15 @@ def test_the_buckling_load_of_a_coarse_curved_panel_is_an_upper_bound(
     nx: int, factor: float
 ) -> None:
     # A Ritz series gives 1.128; 64 x 32 elements, 2.4 along a buckle, give 1.130.
-    made = new(
+    answer = new(
         *("--size", "2000x1000", "--mesh", f"{nx}x{nx // 2}", "--radius-y", "2000"),
         *("--support", "simple", "--layup", "[0/90/-45/45]s", "--ply-thickness", ".125"),
         *("--units", "mm-N-s", "--ply", "1.58e-9,.28,142500,8700,5100,5100,5100"),
         *("--preload=-10,0,1", "--projectile", "mass:1e-3", "--law", "4e4,0,0,1.5"),
         *("--velocity", "1000", "--duration", "1e-4", "--dt", "1e-7", "--patch", "none"),
     )
-    assert "W561" in made.stderr
-    (problem,) = load_deck(made.stdout).problems
+    assert "W561" in answer.stderr
+    (problem,) = load_deck(answer.stdout).problems
     summary = deck_summary(problem)
     assert summary.buckling_factor == pytest.approx(factor, rel=1e-3)
     assert summary.elements_per_buckle == pytest.approx(1.73 * 2000.0**0.5 / (2000.0 / nx))
@@ -302,5 +302,5 @@ def test_a_report_names_the_radii(curved: fecm.Result, monkeypatch: pytest.Monke
 
 
 def test_the_error_of_a_linear_panel_is_said_to_be_that_of_a_flat_plate() -> None:
-    found = fecm.sweep(panel(radius_x=100.0), {"velocity": [2e4]})
-    assert CURVED in "\n".join(found.notes)
+    swept = fecm.sweep(panel(radius_x=100.0), {"velocity": [2e4]})
+    assert CURVED in "\n".join(swept.notes)

@@ -162,8 +162,10 @@ def test_stresses_at_a_small_load_are_those_of_the_linear_panel(radii: tuple[flo
 @cache
 def stretched(radius: float, velocity: float, steps: int = 300) -> Result:
     """A panel struck so hard that it stretches, or so softly that it does not."""
-    made = struck((0.0, radius), mesh(12), 5e-7, steps, others=(NONL,), velocity=velocity, every=50)
-    return decks.run_of_deck(made)
+    struck_plate = struck(
+        (0.0, radius), mesh(12), 5e-7, steps, others=(NONL,), velocity=velocity, every=50
+    )
+    return decks.run_of_deck(struck_plate)
 
 
 def test_small_deflections_are_those_of_the_linear_panel() -> None:

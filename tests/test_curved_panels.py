@@ -53,27 +53,27 @@ def mean_deflection(found: Result) -> float:
 @by_panel(PANELS[0], PANELS[3])
 @pytest.mark.few(1)  # of 2, 0.3 s each
 def test_the_static_deflection_is_that_of_the_series(radii: tuple[float, float]) -> None:
-    found = decks.run_of_deck(panel(radii, STATIC, fine_middle(8), load=1.0))
-    assert mean_deflection(found) == pytest.approx(float(ROWS[radii][curved_panels.W]), rel=1.5e-3)
-    assert found.tape3.w.max() == pytest.approx(float(ROWS[radii]["w"]), rel=1e-3)
+    result = decks.run_of_deck(panel(radii, STATIC, fine_middle(8), load=1.0))
+    assert mean_deflection(result) == pytest.approx(float(ROWS[radii][curved_panels.W]), rel=1.5e-3)
+    assert result.tape3.w.max() == pytest.approx(float(ROWS[radii]["w"]), rel=1e-3)
 
 
 @by_panel(PANELS[3])
 def test_membrane_forces_and_moments_are_those_of_the_series(radii: tuple[float, float]) -> None:
     deck = panel(radii, f"{STATIC} STRE", fine_middle(16), load=1.0, points=2)
-    found = decks.run_of_deck(deck)
-    away = np.hypot(found.stresses.x - SIDES[0] / 2.0, found.stresses.y - SIDES[1] / 2.0)
+    result = decks.run_of_deck(deck)
+    away = np.hypot(result.stresses.x - SIDES[0] / 2.0, result.stresses.y - SIDES[1] / 2.0)
     nearest = away < 1.0
     assert np.count_nonzero(nearest) == 4
     for name in ("N_x", "N_y", "M_x", "M_y"):
-        value = found[f"stresses/{name}"][0][nearest].mean()
+        value = result[f"stresses/{name}"][0][nearest].mean()
         assert value == pytest.approx(float(ROWS[radii][name.replace("_", "")]), rel=0.015), name
 
 
 @by_panel(PANELS[2])
 def test_frequencies_are_those_of_the_series(radii: tuple[float, float]) -> None:
-    found = decks.run_of_deck(panel(radii, "CMAS EIGE=10", mesh(24)))
-    frequencies = found.modes.angular_frequency
+    result = decks.run_of_deck(panel(radii, "CMAS EIGE=10", mesh(24)))
+    frequencies = result.modes.angular_frequency
     names = ("omega_11", "omega_12", "omega_21", "omega_13")
     wanted = [float(ROWS[radii][name]) for name in names]
     off = [np.abs(frequencies / omega - 1.0).min() for omega in wanted if omega < frequencies[-1]]
@@ -96,23 +96,23 @@ def history(radii: tuple[float, float]) -> dict[str, Floats]:
 @pytest.mark.long
 def test_an_impact_is_that_of_the_series(radii: tuple[float, float]) -> None:
     dt = 2.13e-7
-    found = decks.run_of_deck(struck(radii, mesh(60), dt, int(DURATION / dt) + 1))
-    assert found.history.force.max() == pytest.approx(float(ROWS[radii][PEAK]), rel=2e-3)
+    result = decks.run_of_deck(struck(radii, mesh(60), dt, int(DURATION / dt) + 1))
+    assert result.history.force.max() == pytest.approx(float(ROWS[radii][PEAK]), rel=2e-3)
     wanted = history(radii)
     for name, own in (("force", "force"), ("plate_W", "plate_w")):
-        values = np.interp(wanted["time"], found.history.time, found[f"history/{own}"])
+        values = np.interp(wanted["time"], result.history.time, result[f"history/{own}"])
         size = np.abs(wanted[name]).max()
         assert np.abs(values - wanted[name]).max() < 0.01 * size, name
     supplied = 0.5 * 2e-5 * 3000.0**2
-    assert np.abs(found.energy.balance_error).max() < 1e-5 * supplied
+    assert np.abs(result.energy.balance_error).max() < 1e-5 * supplied
 
 
 # Symmetries ---------------------------------------------------------------------------------------
 
 
 def every_result(deck: model.Deck) -> dict[str, Floats]:
-    found = decks.run_of_deck(deck)
-    return {path: found[path] for path in found}
+    result = decks.run_of_deck(deck)
+    return {path: result[path] for path in result}
 
 
 def test_infinite_radii_give_the_bits_of_the_flat_plate() -> None:
@@ -183,8 +183,8 @@ GAGES = model.Gages((model.Gage(1, 130.0, 90.0, 1.0, 30.0), model.Gage(2, 200.0,
 @pytest.mark.skipif(kernels.LIBRARY is None, reason="needs the compiled kernels")
 def test_every_solver_gives_the_same_impact() -> None:
     """The kernels and NumPy with half of the elements, the sparse matrix with all."""
-    made = struck((-400.0, 900.0, 1500.0), mesh(6), 5e-7, 200, others=(GAGES,), every=50)
-    one, *others = (fecm.run_one(made, solver=name) for name in ("kernels", "numpy", "csr"))
+    struck_plate = struck((-400.0, 900.0, 1500.0), mesh(6), 5e-7, 200, others=(GAGES,), every=50)
+    one, *others = (fecm.run_one(struck_plate, solver=name) for name in ("kernels", "numpy", "csr"))
     for other in others:
         for path in ("history/force", "gages/strain", "tape8/kappa_x", "energy/plate_strain"):
             size = 1e-10 * np.abs(one[path]).max()
@@ -193,7 +193,7 @@ def test_every_solver_gives_the_same_impact() -> None:
 
 def test_a_run_stores_stresses_exposures_and_gages_with_the_strains_of_the_radii() -> None:
     strengths = model.Allowables(2500.0, 1500.0, 60.0, 200.0, 90.0, 90.0, 60.0)
-    made = struck(
+    struck_plate = struck(
         (0.0, 500.0),
         mesh(6),
         5e-7,
@@ -202,27 +202,27 @@ def test_a_run_stores_stresses_exposures_and_gages_with_the_strains_of_the_radii
         every=40,
         more="DISP=40 STRE=40 PLYS=40 FAIL=40",
     )
-    found = fecm.run_one(made)
-    (problem,) = load_deck(made).problems
+    result = fecm.run_one(struck_plate)
+    (problem,) = load_deck(struck_plate).problems
     # The mean over the thickness of a symmetric laminate leaves the stress of the midplane strain.
-    first = found.plies.sigma_1[..., 0, 0] + found.plies.sigma_1[..., -1, -1]
+    first = result.plies.sigma_1[..., 0, 0] + result.plies.sigma_1[..., -1, -1]
     q = problem.laminate.plies.stiffness[0]
-    strains = found.stresses
+    strains = result.stresses
     along = 2.0 * (q[0, 0] * strains.eps_xx + q[0, 1] * strains.eps_yy)
     np.testing.assert_allclose(first, along, rtol=0.0, atol=1e-9 * np.abs(first).max())
-    assert np.abs(first).max() > 0.01 * found.plies.sigma_1.max()
+    assert np.abs(first).max() > 0.01 * result.plies.sigma_1.max()
     # Exposures are those of the stored stresses.
-    s, tau = strengths, np.abs(found.plies.tau_12)
-    sigma_1, sigma_2 = found.plies.sigma_1, found.plies.sigma_2
+    s, tau = strengths, np.abs(result.plies.tau_12)
+    sigma_1, sigma_2 = result.plies.sigma_1, result.plies.sigma_2
     ratios = [sigma_1 / s.xt, -sigma_1 / s.xc, sigma_2 / s.yt, -sigma_2 / s.yc, tau / s.s12]
     right = np.max(ratios, axis=(0, 1))
-    np.testing.assert_allclose(found.failure.max_stress.exposure, right, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(result.failure.max_stress.exposure, right, rtol=1e-9, atol=1e-12)
     # Gages are those of the stored displacements.
     read = gages(problem.mesh, GAGES.records, curvature=problem.plate.curvature)
-    rows = np.searchsorted(found.gages.step, found.tape3.step)
-    fields = found.tape3.displacement.reshape(len(rows), -1)
+    rows = np.searchsorted(result.gages.step, result.tape3.step)
+    fields = result.tape3.displacement.reshape(len(rows), -1)
     strain = read.strains((fields[:, read.dof_indices] * read.weights).sum(axis=2))
-    np.testing.assert_allclose(found.gages.strain[rows], strain, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(result.gages.strain[rows], strain, rtol=1e-9, atol=1e-15)
 
 
 def swept_forces(deck: model.Deck, vary: dict[str, list[float] | list[str]]) -> Floats:

@@ -112,10 +112,12 @@ def test_a_gage_reads_the_strain_of_the_radii_in_its_direction(direction: float)
     plate = free_panel()
     field = lifted(plate)
     gage = model.Gage(1, 0.41, 0.37, 0.1, direction)
-    made = gages(plate.mesh, [gage], curvature=plate.curvature)
+    gage_cards = gages(plate.mesh, [gage], curvature=plate.curvature)
     c, s = np.cos(np.deg2rad(direction)), np.sin(np.deg2rad(direction))
     strain = STRAIN + 0.4 * strain_of_deflection(BENT)
-    found = made.strains((field.ravel()[made.dof_indices] * made.weights).sum(axis=1))
+    found = gage_cards.strains(
+        (field.ravel()[gage_cards.dof_indices] * gage_cards.weights).sum(axis=1)
+    )
     assert found[0] == pytest.approx(np.array([c * c, s * s, c * s]) @ strain, rel=1e-10)
 
 
@@ -190,11 +192,11 @@ def test_u_and_v_of_a_curved_panel_are_not_at_rest() -> None:
 def test_the_critical_time_step_contains_the_curvature() -> None:
     """A deep curvature stiffens w so much that it limits the step, which has a dense solution."""
     plate = free_panel(isotropic_plate(0.05), curvature=(40.0, 0.0, 0.0))
-    found = critical_time_step(plate)
+    critical = critical_time_step(plate)
     scaled = plate.stiffness.toarray() / np.sqrt(np.outer(plate.mass, plate.mass))
-    assert found == pytest.approx(2.0 / np.sqrt(np.linalg.eigvalsh(scaled)[-1]), rel=1e-4)
-    assert found < 0.96 * critical_time_step(replace(plate, curvature=FLAT))
-    assert 0.8 * found < safe_time_step(plate) <= found
+    assert critical == pytest.approx(2.0 / np.sqrt(np.linalg.eigvalsh(scaled)[-1]), rel=1e-4)
+    assert critical < 0.96 * critical_time_step(replace(plate, curvature=FLAT))
+    assert 0.8 * critical < safe_time_step(plate) <= critical
 
 
 # Buckling -----------------------------------------------------------------------------------------

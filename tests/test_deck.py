@@ -311,6 +311,6 @@ def test_line_ends_and_byte_order_marks_of_other_systems_change_nothing() -> Non
 def test_numpys_numbers_are_written_as_plain_ones() -> None:
     deck = fecm.read_one(small())
     node = NodeValues(1, 0, (np.float64(0.123456789012), np.float64(1.6)))
-    made = replace(deck, segments=(Coordinates((node,)),), text="")
-    assert "np." not in made.to_text()
-    assert "0.123456789012" in made.to_text()
+    changed = replace(deck, segments=(Coordinates((node,)),), text="")
+    assert "np." not in changed.to_text()
+    assert "0.123456789012" in changed.to_text()

@@ -96,16 +96,16 @@ def test_a_small_letter_is_an_exponent_and_a_capital_a_material() -> None:
     ids=["plate", "laminate", "projectile", "all"],
 )
 def test_a_deck_with_other_parts_is_the_deck_made_of_them(given: Any, wanted: Any) -> None:
-    made = fecm.impact(*wanted, **DAMAGED)
+    impact_deck = fecm.impact(*wanted, **DAMAGED)
     deck = DECK.with_(**given)
-    assert parts(deck) == parts(made)
-    assert deck.macros[1] == made.macros[1]  # DT
+    assert parts(deck) == parts(impact_deck)
+    assert deck.macros[1] == impact_deck.macros[1]  # DT
     assert fecm.read_one(deck.to_text()) == deck
 
 
 def test_a_new_plate_is_struck_where_the_impact_is_asked_for() -> None:
-    made = fecm.impact(OTHER_PLATE, PLIES, MASS, SPHERE, at=(30, 20), **DAMAGED)
-    assert parts(DECK.with_(plate=OTHER_PLATE, at=(30, 20))) == parts(made)
+    deck = fecm.impact(OTHER_PLATE, PLIES, MASS, SPHERE, at=(30, 20), **DAMAGED)
+    assert parts(DECK.with_(plate=OTHER_PLATE, at=(30, 20))) == parts(deck)
     moved = DECK.with_(at=(30, 20)).with_(plate=PLATE)  # in its middle again
     assert parts(moved) == parts(DECK)
 
@@ -199,9 +199,9 @@ def test_a_quantity_of_pint_is_the_text_that_it_prints() -> None:
     speed, energy, time = (units(text) for text in ("3 m/s", "2 J", "50 microsecond"))
     assert DECK.with_(velocity=speed).require(Impact).velocity == 3000.0
     assert DECK.with_(energy=energy, duration=time) == DECK.with_(energy="2J", duration="50us")
-    made = fecm.impact(PLATE, PLIES, MASS, FIRM, **QUICK | {"velocity": speed, "duration": time})
+    deck = fecm.impact(PLATE, PLIES, MASS, FIRM, **QUICK | {"velocity": speed, "duration": time})
     texts = {"velocity": "3m/s", "duration": "50us"}
-    assert made == fecm.impact(PLATE, PLIES, MASS, FIRM, **QUICK | texts)
+    assert deck == fecm.impact(PLATE, PLIES, MASS, FIRM, **QUICK | texts)
     swept = fecm.sweep(DECK, {"energy": [0.1, 0.2] * units.J})
     assert swept["energy"].tolist() == [100.0, 200.0]
     with pytest.raises(ValueError, match="`energy` is '2 mm', not a number or one with a unit"):
@@ -342,9 +342,9 @@ def test_a_time_step_that_was_chosen_for_the_plate_follows_a_new_one() -> None:
     def steps(deck: fecm.Deck) -> list[float]:
         return [macro.value for macro in deck.macros if macro.word in ("DT", "LOOP")]
 
-    made = fecm.impact(OTHER_PLATE, PLIES, MASS, SPHERE, **DAMAGED)
+    impact_deck = fecm.impact(OTHER_PLATE, PLIES, MASS, SPHERE, **DAMAGED)
     (dt, count), (before, own_count) = steps(DECK.with_(plate=OTHER_PLATE)), steps(DECK)
-    assert dt == steps(made)[0] != before
+    assert dt == steps(impact_deck)[0] != before
     assert 0.0 <= dt * count - before * own_count < dt
     own = DECK.with_(dt=1e-8)
     assert steps(own.with_(plate=OTHER_PLATE)) == steps(own)

@@ -131,12 +131,12 @@ def test_blank_lines_between_segments_make_no_cards(monkeypatch: pytest.MonkeyPa
         return Card(line, text)
 
     monkeypatch.setattr(segment, "Card", counted)
-    made = []
+    values = []
     for blanks in (0, 5000):
         cards = 0
         assert codes(small().replace("MATE", "\n" * blanks + "MATE")) == []
-        made.append(cards)
-    assert made[0] == made[1] > 0
+        values.append(cards)
+    assert values[0] == values[1] > 0
 
 
 @pytest.mark.parametrize(

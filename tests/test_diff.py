@@ -145,9 +145,9 @@ def test_nan_is_nan_and_an_infinity_only_itself_at_any_tolerance(
     for tolerance in ((), ("--rtol", "10", "--atol", "1e308")):
         done = diff(a, b, *tolerance, "--only", "history", "--format", "json")
         assert done.exit_code == 1
-        found = {entry["name"]: entry for entry in strict(done)["datasets"]}
+        by_name = {entry["name"]: entry for entry in strict(done)["datasets"]}
         for name, (_, _, same) in SPECIAL.items():
-            entry = found[f"history/{name}"]
+            entry = by_name[f"history/{name}"]
             assert entry["same"] is same, name
             if not same:
                 assert entry["at"]["step"] == entry["first"]["step"] == 5
@@ -294,12 +294,12 @@ def test_the_last_tolerance_that_matches_a_dataset_holds(
     ):
         assert diff(a, b, "--only", "history", *options).exit_code == status, options
     said = strict(diff(a, b, "--tol-file", file, "--rtol", "1e-3", "--format", "json"))
-    found = {
+    by_name = {
         entry["name"]: entry["tolerance"] / (entry["scale"] or 1.0)
         for entry in said["datasets"]
         if "force" in entry["name"]
     }
-    assert found == pytest.approx({"history/force": 1e-2, "tape9/force": 1e-3})
+    assert by_name == pytest.approx({"history/force": 1e-2, "tape9/force": 1e-3})
     assert "tape8/kappa_x" in said["excluded"]
 
 

@@ -134,8 +134,8 @@ def test_an_element_without_one_of_its_corners_is_refused(
 ) -> None:
     coordinates, elements = square(2, 2, kind)
     elements[2, absent] = 0
-    found = findings(deck((coordinates, elements), (3, 3, 3)))
-    assert [(code, message) for code, message, _ in found] == [
+    codes = findings(deck((coordinates, elements), (3, 3, 3)))
+    assert [(code, message) for code, message, _ in codes] == [
         ("E310", f"Element 3 lacks one of its {corners} corners.")
     ]
 

@@ -112,8 +112,8 @@ def test_consistent_mass_holds_the_kinetic_energy_of_linear_motions(kind: int) -
     coordinates, _ = mesh = distorted_square(3, 4, kind)
     motion = np.zeros((len(coordinates), 5))
     motion[:, 2] = coordinates @ [1.0, 2.0]  # over the unit square: 1/3 + 4/3 + 4/4
-    found = motion.ravel() @ free_plate(mesh, EXACT[kind]).consistent_mass @ motion.ravel()
-    assert found == pytest.approx(DENSITY * THICKNESS * 8.0 / 3.0, rel=1e-12)
+    value = motion.ravel() @ free_plate(mesh, EXACT[kind]).consistent_mass @ motion.ravel()
+    assert value == pytest.approx(DENSITY * THICKNESS * 8.0 / 3.0, rel=1e-12)
 
 
 @pytest.mark.parametrize(

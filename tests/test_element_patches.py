@@ -223,5 +223,5 @@ def test_every_way_to_multiply_by_the_stiffness_gives_the_same_forces(kind: int)
     u = np.random.default_rng(2).standard_normal(mesh.number_of_equations)
     expected = model.stiffness.toarray() @ u
     for solver in ("", "csr"):
-        found = stiffness_operator(model, solver)(u)
-        np.testing.assert_allclose(found, expected, atol=1e-13 * np.abs(expected).max())
+        product = stiffness_operator(model, solver)(u)
+        np.testing.assert_allclose(product, expected, atol=1e-13 * np.abs(expected).max())

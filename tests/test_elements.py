@@ -133,13 +133,13 @@ def test_a_square_reproduces_as_many_powers_of_xi_and_eta_as_it_has_nodes_and_no
 ) -> None:
     xi, eta = sample()
     values, _ = shape.shape_functions(xi, eta, first(shape, nodes))
-    found = {
+    names = {
         (p, q)
         for p, q in product(range(5), repeat=2)
         if np.abs(values @ (shape.xi**p * shape.eta**q) - xi**p * eta**q).max() < 1e-13
     }
-    assert found == powers
-    assert len(found) == nodes
+    assert names == powers
+    assert len(names) == nodes
 
 
 def test_a_triangles_functions_are_its_area_coordinates() -> None:

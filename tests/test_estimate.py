@@ -33,11 +33,11 @@ def test_the_row_of_the_run_is_the_run(tmp_path: Path) -> None:
     assert "delamination at the latest from these" in call("estimate", "d.inp", cwd=tmp_path).stdout
     done = call("estimate", "d.inp", "--format", "json", cwd=tmp_path)
     assert done.exit_code == 0
-    found = json.loads(done.stdout)
-    assert [row["model"] for row in found["models"]] == ["infinite plate", "run"]
+    document = json.loads(done.stdout)
+    assert [row["model"] for row in document["models"]] == ["infinite plate", "run"]
     full = fecm.run_one(tmp_path / "d.inp")
-    assert found["models"][1]["peak_force"] == pytest.approx(full.force.max(), rel=1e-9)
-    assert found["models"][1]["threshold"] == pytest.approx(full.threshold["force"], rel=1e-12)
+    assert document["models"][1]["peak_force"] == pytest.approx(full.force.max(), rel=1e-9)
+    assert document["models"][1]["threshold"] == pytest.approx(full.threshold["force"], rel=1e-12)
 
 
 @pytest.mark.long
@@ -49,9 +49,9 @@ def test_a_model_out_of_its_range_is_marked(tmp_path: Path) -> None:
     for name, ratio in ratios.items():
         mass = ratio * plate.plate.area() * plate.laminate.mass
         text = deck(f"PROJ\n0, 0, {mass:.9g}\n\n", mesh=HELD)
-        found = quick_estimate(load_deck(text).problems[0])
-        assert found.mass_ratio == pytest.approx(ratio, rel=1e-6)
-        assert [model.applies for model in found.models] == expected[name]
+        estimate = quick_estimate(load_deck(text).problems[0])
+        assert estimate.mass_ratio == pytest.approx(ratio, rel=1e-6)
+        assert [model.applies for model in estimate.models] == expected[name]
     (tmp_path / "d.inp").write_text(text)
     lines = call("estimate", "d.inp", cwd=tmp_path).stdout.splitlines()
     assert not any(line.startswith("  infinite plate") for line in lines)  # for small masses
@@ -73,8 +73,8 @@ def test_a_held_plate_has_a_static_model_with_its_own_stiffness() -> None:
 
 def test_models_reach_the_threshold_at_their_velocity() -> None:
     (problem,) = load_deck(deck("DELA\n.5,\n", mesh=HELD)).problems
-    found = quick_estimate(problem)
-    for model in found.models:
+    estimate = quick_estimate(problem)
+    for model in estimate.models:
         segments = tuple(
             replace(s, velocity=model.velocity) if isinstance(s, Impact) else s
             for s in problem.deck.segments

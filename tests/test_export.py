@@ -401,8 +401,8 @@ def test_every_axis_of_what_is_stored_in_rows_has_a_scale(file: Path) -> None:
     }
     with h5py.File(file) as opened:
         for path, scales in expected.items():
-            found = [dimension[0].name.strip("/") for dimension in opened[path].dims]
-            assert found == scales
+            values = [dimension[0].name.strip("/") for dimension in opened[path].dims]
+            assert values == scales
         assert opened["node"][()].tolist() == list(range(1, 26))
         assert opened["unknown"].asstr()[()].tolist() == ["u", "v", "w", "theta_x", "theta_y"]
         attributes = opened["history/force"].attrs

@@ -131,9 +131,9 @@ def damaged() -> fecm.Deck:
 
 def forces(deck: fecm.Deck, law: Any, *velocities: float) -> Floats:
     """Contact forces of a sweep, (velocities, steps)."""
-    found = fecm.sweep(deck, {"velocity": list(velocities)}, history=True, law=law)
-    assert found.force is not None
-    return found.force
+    swept = fecm.sweep(deck, {"velocity": list(velocities)}, history=True, law=law)
+    assert swept.force is not None
+    return swept.force
 
 
 def test_a_sweep_gives_the_cases_of_a_users_law_as_runs_do(deck: fecm.Deck) -> None:
@@ -210,10 +210,10 @@ def _without_memory() -> Any:
 
 def test_a_law_that_fails_in_one_case_fails_that_case_alone(deck: fecm.Deck) -> None:
     law = Faulty(lambda a: np.nan, 9e-4)
-    found = fecm.sweep(deck, {"velocity": [20.0, 115.0]}, law=law)
-    assert found.completed.tolist() == [True, False]
-    assert "contact law Faulty: the force is nan at the indentation 0.0009" in found["status"][1]
-    assert np.isnan(found["peak_force"][1])
+    swept = fecm.sweep(deck, {"velocity": [20.0, 115.0]}, law=law)
+    assert swept.completed.tolist() == [True, False]
+    assert "contact law Faulty: the force is nan at the indentation 0.0009" in swept["status"][1]
+    assert np.isnan(swept["peak_force"][1])
 
 
 def test_a_law_too_stiff_for_the_time_step_diverges_and_is_named() -> None:
@@ -236,9 +236,9 @@ def test_constants_that_a_users_law_replaces_can_neither_vary_nor_be_fitted(
 @pytest.mark.long
 def test_a_fit_under_a_users_law_finds_the_velocity_it_was_computed_with(deck: fecm.Deck) -> None:
     measured = fecm.run_one(deck.with_(velocity=100.0), law=Dented())
-    found = fecm.identify(deck, measured.time, measured.force, ["velocity"], law=Dented())
-    assert found.values["velocity"] == pytest.approx(100.0, rel=1e-4)
-    assert found.law == "Dented"
+    fit = fecm.identify(deck, measured.time, measured.force, ["velocity"], law=Dented())
+    assert fit.values["velocity"] == pytest.approx(100.0, rel=1e-4)
+    assert fit.law == "Dented"
     with pytest.raises(fecm.FecmError, match="contact law Faulty: the force is nan"):
         fecm.identify(
             deck, measured.time, measured.force, ["velocity"], law=Faulty(lambda a: np.nan)
@@ -282,8 +282,8 @@ def test_a_users_criterion_is_in_the_file_and_in_the_summary(
 ) -> None:
     path = tmp_path / "own.h5"
     fecm.run_one(damaged, criteria=[norris], output=path)
-    found = call("info", path, "--format", "json")
-    assert found.exit_code == 0
+    answer = call("info", path, "--format", "json")
+    assert answer.exit_code == 0
     again = fecm.load(path)
     assert again["failure/norris/exposure"].shape == again["failure/puck/exposure"].shape
     assert "norris" in call("info", path).stdout
@@ -384,13 +384,13 @@ def test_criteria_need_a_program_that_evaluates_them(deck: fecm.Deck) -> None:
 def test_a_projectile_of_one_mass_moves_as_a_rigid_mass(deck: fecm.Deck, solver: Solver) -> None:
     mass = 2e-4
     by_card = fecm.run_one(_rigid(deck, mass), solver=solver)
-    own = fecm.run_one(deck, projectile=Bodies([mass], [[0.0]]), solver=solver)
+    result = fecm.run_one(deck, projectile=Bodies([mass], [[0.0]]), solver=solver)
     known = fecm.run_one(deck, projectile=fecm.RigidMass(mass), solver=solver)
     np.testing.assert_array_equal(known.force, by_card.force)
-    np.testing.assert_allclose(own.force, by_card.force, rtol=1e-9, atol=1e-9)
-    own_energy, energy = own.energy.projectile_kinetic, by_card.energy.projectile_kinetic
+    np.testing.assert_allclose(result.force, by_card.force, rtol=1e-9, atol=1e-9)
+    own_energy, energy = result.energy.projectile_kinetic, by_card.energy.projectile_kinetic
     np.testing.assert_allclose(own_energy, energy, rtol=1e-9)
-    assert own.attributes["projectile"] == "Bodies"
+    assert result.attributes["projectile"] == "Bodies"
     assert known.attributes["projectile"] == "RigidMass"
 
 

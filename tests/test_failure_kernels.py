@@ -165,11 +165,11 @@ def fabrics(*, stretches: bool) -> Monitors:
 def with_own(*, stretches: bool) -> Monitors:
     """With a user's criterion, which is not proportional to the stresses."""
     one, _ = one_laminate(stretches=stretches)
-    own = [OwnCriterion("norris", norris).with_modes(STRENGTHS)]
+    values = [OwnCriterion("norris", norris).with_modes(STRENGTHS)]
     stresses = one.stresses
     return (
-        CompiledMonitor(stresses, STRENGTHS, own),
-        FailureMonitor(stresses, STRENGTHS, own),
+        CompiledMonitor(stresses, STRENGTHS, values),
+        FailureMonitor(stresses, STRENGTHS, values),
     )
 
 
@@ -207,12 +207,12 @@ def test_what_can_not_rise_is_left_out_without_a_change_of_a_bit(
     stretched, known = MOTIONS[motion]
     compiled, _ = CASES[case](stretches=known)
     given = fields(plate(), 24, stretched=stretched)
-    found = history(compiled, given)
+    histories = history(compiled, given)
     monkeypatch.setattr(compiled_failure, "_prunes", lambda _: False)
     every = history(compiled, given)
     for part in ("exposure", "time", "mode"):
-        np.testing.assert_array_equal(getattr(found.plies, part), getattr(every.plies, part))
-        np.testing.assert_array_equal(found.largest.state, every.largest.state)
+        np.testing.assert_array_equal(getattr(histories.plies, part), getattr(every.plies, part))
+        np.testing.assert_array_equal(histories.largest.state, every.largest.state)
 
 
 def test_a_state_that_can_not_rise_is_not_evaluated() -> None:
@@ -268,11 +268,11 @@ def test_a_motion_that_is_no_longer_finite_leaves_what_numpy_leaves(value: float
     given[1, 0] = value
     with np.errstate(all="ignore"):
         wanted = history(numpy, given)
-    found = history(compiled, given)
+    histories = history(compiled, given)
     np.testing.assert_array_equal(
-        np.isnan(found.interfaces.exposure), np.isnan(wanted.interfaces.exposure)
+        np.isnan(histories.interfaces.exposure), np.isnan(wanted.interfaces.exposure)
     )
-    assert not np.isnan(found.plies.exposure).any()
+    assert not np.isnan(histories.plies.exposure).any()
 
 
 def with_counts(monitor: CompiledMonitor, share: float) -> CompiledMonitor:
@@ -295,21 +295,21 @@ def test_the_largest_exposures_that_count_are_those_of_all_states(
     envelope, known = monitor.start(), len(monitor.criteria)
     strains = []
     for time, field in enumerate(fields(plate(), 12, stretched=stretches), start=1):
-        found = monitor.update(envelope, field[None], [float(time)])
+        exposures = monitor.update(envelope, field[None], [float(time)])
         strains.append(monitor.stresses.strains(field)[0].reshape(-1, 6))
         exposure = envelope.plies.exposure.reshape(known, monitor.counts.size, -1)
         away = exposure[:, monitor.counts.ravel()]
         far = envelope.interfaces.exposure[monitor.counts.all(axis=1)]
         if share == 0.0:
-            assert (found.state == -1).all()
-            assert np.isnan(found.exposure).all()
+            assert (exposures.state == -1).all()
+            assert np.isnan(exposures.exposure).all()
             continue
-        np.testing.assert_array_equal(found.exposure[0, :-1], away.max(axis=(1, 2)))
-        assert found.exposure[0, -1] == np.nanmax(far)
-        at = (range(known), found.state[0, :-1])
-        np.testing.assert_array_equal(envelope.plies.exposure[at], found.exposure[0, :-1])
-        np.testing.assert_array_equal(envelope.plies.mode[at], found.mode[0, :-1])
-        for number, state in enumerate(found.state[0, :-1]):
+        np.testing.assert_array_equal(exposures.exposure[0, :-1], away.max(axis=(1, 2)))
+        assert exposures.exposure[0, -1] == np.nanmax(far)
+        at = (range(known), exposures.state[0, :-1])
+        np.testing.assert_array_equal(envelope.plies.exposure[at], exposures.exposure[0, :-1])
+        np.testing.assert_array_equal(envelope.plies.mode[at], exposures.mode[0, :-1])
+        for number, state in enumerate(exposures.state[0, :-1]):
             reached = int(envelope.plies.time[number, state])
             wanted = strains[reached - 1][state // monitor.states]
             np.testing.assert_allclose(envelope.largest.strain[number], wanted, rtol=1e-11)
@@ -357,12 +357,12 @@ def test_fields_together_leave_what_they_leave_one_by_one(case: str) -> None:
     monitor, _ = CASES[case](stretches=False)
     given = fields(plate(), 12, stretched=False)
     one, other = monitor.start(), monitor.start()
-    found = monitor.update(one, given, times_of(given))
+    exposures = monitor.update(one, given, times_of(given))
     rows = [
         monitor.update(other, field[None], [time])
         for field, time in zip(given, times_of(given), strict=True)
     ]
-    for values, single in zip(found, zip(*rows, strict=True), strict=True):
+    for values, single in zip(exposures, zip(*rows, strict=True), strict=True):
         np.testing.assert_array_equal(values, np.concatenate(single))
     for part in ("exposure", "time", "mode"):
         np.testing.assert_array_equal(getattr(one.plies, part), getattr(other.plies, part))
@@ -410,10 +410,10 @@ def test_the_outermost_states_are_those_farthest_from_the_midplane() -> None:
     """Of [45/0/-45/90]s, two faces of each ply: the outer faces of the outer plies of an angle."""
     compiled, _ = one_laminate(stretches=False)
     (zone,) = compiled.zones
-    found = zone.represent
-    assert found.states.tolist() == [0, 2, 4, 6, 9, 11, 13, 15]
-    np.testing.assert_array_equal(found.states[found.of[[0, 1, 6, 7, 8]]], [0, 0, 6, 9, 9])
-    np.testing.assert_allclose(found.share[[1, 3, 7, 15]], [0.75, 2.0 / 3.0, 0.0, 1.0])
+    represent = zone.represent
+    assert represent.states.tolist() == [0, 2, 4, 6, 9, 11, 13, 15]
+    np.testing.assert_array_equal(represent.states[represent.of[[0, 1, 6, 7, 8]]], [0, 0, 6, 9, 9])
+    np.testing.assert_allclose(represent.share[[1, 3, 7, 15]], [0.75, 2.0 / 3.0, 0.0, 1.0])
 
 
 def test_a_restored_run_keeps_nothing_of_the_exposures_after_it() -> None:
@@ -470,12 +470,12 @@ def test_a_run_knows_beforehand_whether_its_midplane_stretches(kind: str, stretc
     monitor = build_model(problem).failure
     assert monitor is not None
     assert monitor.stresses.stretches == stretches
-    found = fecm.run_one(moving(kind))
-    strains = [monitor.stresses.strains(u)[0][..., :3] for u in found["tape3/displacement"]]
+    result = fecm.run_one(moving(kind))
+    strains = [monitor.stresses.strains(u)[0][..., :3] for u in result["tape3/displacement"]]
     assert np.array(strains).any() == stretches
     wanted = fecm.run_one(moving(kind), solver="numpy")
     for name in ("max_stress", "tsai_wu", "hashin", "puck", "interlaminar"):
         for part in ("exposure", "time", "mode"):
             path = f"failure/{name}/{part}"
-            np.testing.assert_allclose(found[path], wanted[path], rtol=1e-10, atol=1e-20)
-    np.testing.assert_allclose(found["exposures/exposure"], wanted["exposures/exposure"], 1e-10)
+            np.testing.assert_allclose(result[path], wanted[path], rtol=1e-10, atol=1e-20)
+    np.testing.assert_allclose(result["exposures/exposure"], wanted["exposures/exposure"], 1e-10)

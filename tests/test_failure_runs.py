@@ -89,12 +89,12 @@ def test_the_first_ply_fails_at_the_load_of_the_exact_solution(name: str) -> Non
 
 
 def test_exposures_are_the_largest_of_all_stored_displacements() -> None:
-    found = fecm.run_one(failing())
+    result = fecm.run_one(failing())
     (problem,) = load_deck(failing()).problems
     stresses = PlyStresses(problem.mesh, problem.laminate, problem.rules[2])
     ((card, *_),) = strengths_of_deck(problem.deck)
     assert card is not None
-    rows = [stresses.evaluate(field) for field in found["tape3/displacement"]]
+    rows = [stresses.evaluate(field) for field in result["tape3/displacement"]]
     for name, criterion in CRITERIA.items():
         histories = np.array(
             [
@@ -103,9 +103,9 @@ def test_exposures_are_the_largest_of_all_stored_displacements() -> None:
             ]
         )
         np.testing.assert_allclose(
-            found[f"failure/{name}/exposure"], histories.max(axis=0), rtol=1e-12
+            result[f"failure/{name}/exposure"], histories.max(axis=0), rtol=1e-12
         )
-        assert set(np.unique(found[f"failure/{name}/time"])) <= {0.0, *found["tape3/time"]}
+        assert set(np.unique(result[f"failure/{name}/time"])) <= {0.0, *result["tape3/time"]}
 
 
 def test_exposures_of_a_run_have_a_row_for_every_nth_step_and_none_at_rest() -> None:
@@ -170,10 +170,10 @@ def test_fail_needs_strengths_and_report_mode() -> None:
 
 def test_a_single_ply_has_exposures_and_no_interface() -> None:
     one = failing().replace("    2  90.     0.053\n", "").replace("0.     0.053", "0.     0.106")
-    found = fecm.run_one(one.replace("   25    4    2", "   25    4    1"))
-    assert found["failure/puck/exposure"].shape[2] == 1
-    assert found["failure/puck/exposure"].max() > 0.0
-    assert found["failure/interlaminar/exposure"].shape == (4, 0)
+    result = fecm.run_one(one.replace("   25    4    2", "   25    4    1"))
+    assert result["failure/puck/exposure"].shape[2] == 1
+    assert result["failure/puck/exposure"].max() > 0.0
+    assert result["failure/interlaminar/exposure"].shape == (4, 0)
 
 
 def test_interlaminar_exposures_of_elements_without_nine_nodes_are_nan() -> None:

@@ -73,8 +73,8 @@ def test_each_case_has_the_threshold_of_its_toughness_as_in_a_run_of_its_deck() 
 
 def test_a_search_reaches_the_threshold_of_each_toughness() -> None:
     deck = fecm.read_one(tough(400))
-    own = deck.require(Delamination).toughness
-    swept = fecm.sweep(deck, {"giic": [own, 1.2 * own]}, until="threshold")
+    toughness = deck.require(Delamination).toughness
+    swept = fecm.sweep(deck, {"giic": [toughness, 1.2 * toughness]}, until="threshold")
     np.testing.assert_allclose(swept["peak_force"], swept["threshold_force"], rtol=1e-4)
     assert swept["threshold_force"][1] == pytest.approx(
         np.sqrt(1.2) * swept["threshold_force"][0], rel=1e-12
@@ -124,8 +124,8 @@ def test_a_strength_is_that_of_the_ply_of_mate_wherever_its_cards_are() -> None:
     deck = weak()
     ply = deck.require(Allowables)
     both = replace(ply, material=2, others=(ply,))
-    made = replace(deck, segments=tuple(both if s is ply else s for s in deck.segments))
-    card = made.with_(yt=123.0).require(Allowables)
+    changed = replace(deck, segments=tuple(both if s is ply else s for s in deck.segments))
+    card = changed.with_(yt=123.0).require(Allowables)
     assert (card.yt, card.others[0].yt) == (ply.yt, 123.0)
 
 

@@ -47,14 +47,14 @@ def test_a_run_at_the_found_velocity_has_the_threshold_as_its_peak(tmp_path: Pat
     done = call("sweep", "d.inp", *FIND, "peak_force=threshold", "-o", "s.h5", cwd=tmp_path)
     assert "delamination      at the latest from these energies" in done.stdout
     assert done.exit_code == 0
-    found = fecm.load_sweep(tmp_path / "s.h5")
-    (velocity,) = found["found_velocity"]
+    swept = fecm.load_sweep(tmp_path / "s.h5")
+    (velocity,) = swept["found_velocity"]
     assert f"smallest found    {velocity:.4g}, " in done.stdout
     result = fecm.run_one(deck(400).replace("   13    3     115.0", f"13,3,{velocity:.10g}"))
     assert result.force.max() == pytest.approx(result.threshold["force"], rel=1e-5)
-    assert found["peak_force"][0] == pytest.approx(result.force.max(), rel=1e-8)
+    assert swept["peak_force"][0] == pytest.approx(result.force.max(), rel=1e-8)
     # The mass of the report's rod is 1.8096e-4.
-    assert found["found_energy"][0] == pytest.approx(0.5 * 1.8096e-4 * velocity**2, rel=1e-4)
+    assert swept["found_energy"][0] == pytest.approx(0.5 * 1.8096e-4 * velocity**2, rel=1e-4)
 
 
 def test_the_command_that_a_summary_names_finds_the_energy_of_the_threshold(tmp_path: Path) -> None:
@@ -72,8 +72,8 @@ def test_a_case_among_others_equals_a_search_of_its_own() -> None:
     vary: dict[str, list[Any]] = {"layup": ["[0/90]", "[0/0]"], "k": [1e6, 3e6]}
     together = fecm.sweep(deck(400), vary, until="threshold")
     assert {*FOUND, "status", "validity"} <= together.summary.keys()
-    own = {name: values[2] for name, values in together.cases.items()}
-    alone = fecm.sweep(deck(400), cases=[own], until=float(together["threshold_force"][2]))
+    by_name = {name: values[2] for name, values in together.cases.items()}
+    alone = fecm.sweep(deck(400), cases=[by_name], until=float(together["threshold_force"][2]))
     velocity = together["found_velocity"][2]
     assert alone["found_velocity"][0] == pytest.approx(velocity, rel=2e-6)
     assert len(set(together["found_velocity"])) == 4
@@ -94,9 +94,9 @@ def test_what_is_not_reached_is_a_failed_case_with_its_reason(tmp_path: Path) ->
         options = (*FIND, f"peak_force={force}", "-o", "s.h5", "--overwrite")
         done = call("sweep", "d.inp", *options, cwd=tmp_path)
         assert (done.exit_code, words in done.stdout) == (1, True), done.stdout
-        found = fecm.load_sweep(tmp_path / "s.h5")
-        assert np.isnan(found["found_velocity"][0])
-        assert np.isnan(found["peak_force"][0])
+        swept = fecm.load_sweep(tmp_path / "s.h5")
+        assert np.isnan(swept["found_velocity"][0])
+        assert np.isnan(swept["peak_force"][0])
 
 
 def test_a_search_that_makes_no_sense_is_refused(tmp_path: Path) -> None:

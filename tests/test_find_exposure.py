@@ -84,35 +84,35 @@ def test_a_run_at_the_found_velocity_has_this_exposure(tmp_path: Path) -> None:
     options = ("--find", "velocity", "--until", "exposure=1", "-o", "s.h5")
     done = call("sweep", "d.inp", *options, cwd=tmp_path)
     assert done.exit_code == 0, done.stdout + done.stderr
-    found = fecm.load_sweep(tmp_path / "s.h5")
+    swept = fecm.load_sweep(tmp_path / "s.h5")
     command = " ".join(("fecm sweep DECK", *options[:4], "finds the impact energy of the first"))
     assert command in call("run", "d.inp", cwd=tmp_path).stdout
-    (velocity,) = found["found_velocity"]
+    (velocity,) = swept["found_velocity"]
     assert f"smallest found    {velocity:.4g}, " in done.stdout
-    low, high = (found[name][0] for name in ("found_energy_low", "found_energy_high"))
+    low, high = (swept[name][0] for name in ("found_energy_low", "found_energy_high"))
     assert (low, high) == (0.0, np.inf)  # four elements
     assert "; finer meshes not bounded" in done.stdout
     result = run(DECK.replace("     115.0", f"{velocity:10.6f}"))
     largest = result["exposures/exposure"][-1]
     assert largest.max() == pytest.approx(1.0, rel=2e-5)
-    assert "exposure > 1" not in found["validity"][0]
-    columns = [found[name][0] for name in EXPOSURES]
+    assert "exposure > 1" not in swept["validity"][0]
+    columns = [swept[name][0] for name in EXPOSURES]
     assert columns == pytest.approx(largest.tolist(), rel=1e-5)
-    assert found["fail_evaluations"][0] == result.failure.attributes["evaluations_in_contact"]
+    assert swept["fail_evaluations"][0] == result.failure.attributes["evaluations_in_contact"]
     # The mass of the report's rod is 1.8096e-4.
-    assert found["found_energy"][0] == pytest.approx(0.5 * 1.8096e-4 * velocity**2, rel=1e-4)
+    assert swept["found_energy"][0] == pytest.approx(0.5 * 1.8096e-4 * velocity**2, rel=1e-4)
 
 
 @pytest.mark.long
 def test_at_the_ends_of_the_energies_the_band_of_the_exposure_ends_at_the_level() -> None:
     deck = resolved()
-    found = fecm.sweep(deck, until={"exposure": 1.0})
+    swept = fecm.sweep(deck, until={"exposure": 1.0})
     low, energy, high = (
-        found[name][0] for name in ("found_energy_low", "found_energy", "found_energy_high")
+        swept[name][0] for name in ("found_energy_low", "found_energy", "found_energy_high")
     )
     assert low < energy < high
     for end, of_band in ((low, 1), (high, 0)):
-        velocity = found["found_velocity"][0] * np.sqrt(end / energy)
+        velocity = swept["found_velocity"][0] * np.sqrt(end / energy)
         result = fecm.run_one(deck.with_(velocity=velocity))
         assert band_of_largest(largest_exposures(result))[of_band] == pytest.approx(1.0, rel=0.01)
     exposures = fecm.sweep(deck, {"velocity": [3000.0]}, measure=["failure"])
@@ -150,8 +150,8 @@ def test_the_note_counts_the_cases_whose_energy_the_mesh_decides() -> None:
 
     def notes(*low: float) -> str:
         energies = {"found_energy": np.ones(3), "found_energy_low": np.array(low)}
-        found = fecm.SweepResult(sweep.cases, sweep.summary | energies, sweep.dt, sweep.steps)
-        return "\n".join(found.notes)
+        swept = fecm.SweepResult(sweep.cases, sweep.summary | energies, sweep.dt, sweep.steps)
+        return "\n".join(swept.notes)
 
     assert "the mesh decides the energy in 1 of 3 cases" in notes(0.74, 0.76, 1.0)
     assert "the mesh decides the energy" not in notes(0.76, 1.0, 1.0)

@@ -69,19 +69,19 @@ def histories(found: Result) -> dict[str, np.ndarray]:
 
 
 def test_first_failures_are_the_first_crossings_of_the_stresses(every_step: Result) -> None:
-    found = {one.criterion: one for one in every_step.first_failures}
+    by_name = {one.criterion: one for one in every_step.first_failures}
     times = every_step["tape3/time"]
     expected = histories(every_step)
-    assert {*CRITERIA} <= {*found}
+    assert {*CRITERIA} <= {*by_name}
     for name, exposures in expected.items():
         so_far = np.maximum.accumulate(exposures)
         row = int(np.argmax(so_far >= 1.0))
         assert 0 < row < len(times) - 1
-        one = found[name]
+        one = by_name[name]
         assert (one.earliest, one.latest) == (times[row - 1], times[row])
         assert one.time == pytest.approx(np.interp(1.0, so_far, times), rel=1e-12)
         assert one.force == pytest.approx(np.interp(one.time, every_step.time, every_step.force))
-    assert every_step.first_failures == sorted(found.values(), key=lambda one: one.time)
+    assert every_step.first_failures == sorted(by_name.values(), key=lambda one: one.time)
 
 
 def test_the_energy_of_the_first_failure_is_what_the_projectile_has_lost(

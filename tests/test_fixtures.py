@@ -34,7 +34,7 @@ def test_the_static_stiffness_of_d7136_is_that_of_another_code(plate: str) -> No
     with (Path(__file__).parent / "data" / "d7136_stiffness.csv").open() as file:
         (row,) = (r for r in csv.DictReader(file) if (r["plate"], r["support"]) == (plate, WINDOW))
     layup, thickness, ply = PLIES[plate]
-    made = new(
+    answer = new(
         "--fixture",
         "D7136",
         "--layup",
@@ -56,7 +56,7 @@ def test_the_static_stiffness_of_d7136_is_that_of_another_code(plate: str) -> No
         "--shear-factor",
         "1",
     )
-    (problem,) = load_deck(made.stdout).problems
+    (problem,) = load_deck(answer.stdout).problems
     assert problem.contact is not None
     stiffness = static_stiffness(problem.moving_plate, problem.contact)
     assert stiffness == pytest.approx(float(row["n=3"]), rel=0.01)
@@ -71,9 +71,9 @@ def test_d7136_prescribes_mass_energy_patch_and_units() -> None:
 
 
 def test_w_is_held_along_the_window_and_nowhere_else() -> None:
-    made = new("--fixture", "D7136", *PLATE, *QUICK)
-    assert "! Clamps and lift-off are not modelled." in made.stdout
-    (problem,) = load_deck(made.stdout).problems
+    answer = new("--fixture", "D7136", *PLATE, *QUICK)
+    assert "! Clamps and lift-off are not modelled." in answer.stdout
+    (problem,) = load_deck(answer.stdout).problems
     held = problem.mesh.equations[:, 2] == 0
     x, y = np.abs(problem.mesh.coordinates - (75.0, 50.0)).T
     on = (np.isclose(x, 62.5) & (y < 37.5001)) | (np.isclose(y, 37.5) & (x < 62.5001))
@@ -156,14 +156,14 @@ def test_energy_gives_the_velocity_of_the_mass() -> None:
     ],
 )
 def test_what_does_not_go_with_a_fixture_is_refused(options: list[str], message: str) -> None:
-    made = new(*options, *PLATE, *QUICK)
-    assert_unusable(made)
-    assert message in made.stderr
+    answer = new(*options, *PLATE, *QUICK)
+    assert_unusable(answer)
+    assert message in answer.stderr
 
 
 def test_a_laminate_outside_the_standard_is_warned_of() -> None:
-    made = new("--fixture", "D7136", "--layup", "[0/90]s", *PLATE[2:], *QUICK)
-    assert "note: D7136 is for laminates of 4 to 6 mm; this one has 0.736 mm" in made.stderr
+    answer = new("--fixture", "D7136", "--layup", "[0/90]s", *PLATE[2:], *QUICK)
+    assert "note: D7136 is for laminates of 4 to 6 mm; this one has 0.736 mm" in answer.stderr
     assert "D7136 is for" not in new("--fixture", "D7136", *PLATE, *QUICK).stderr
 
 
@@ -176,7 +176,7 @@ SPHERE = ("--size", "100x80", "--mesh", "4x4", "--projectile", "mass:1e-3", "--v
 def test_contact_estimate_is_that_of_indent_estimate_and_says_so_in_the_deck(
     ply: tuple[str, ...],
 ) -> None:
-    made = new(*SPHERE, *ply, "--contact", "estimate:8", "--units", "mm-N-s")
+    answer = new(*SPHERE, *ply, "--contact", "estimate:8", "--units", "mm-N-s")
     printed = call(
         "indent",
         "estimate",
@@ -191,8 +191,8 @@ def test_contact_estimate_is_that_of_indent_estimate_and_says_so_in_the_deck(
         "mm-N-s",
     )
     card = printed.stdout.splitlines()[-1]
-    assert card in made.stdout
-    assert "! k of EXPE is estimated by the laminate's indentation modulus" in made.stdout
+    assert card in answer.stdout
+    assert "! k of EXPE is estimated by the laminate's indentation modulus" in answer.stdout
     fixture = new("--fixture", "D7136", *ply, *QUICK, "--contact", "estimate")
     assert card in fixture.stdout
 
@@ -207,16 +207,16 @@ def test_contact_estimate_is_that_of_indent_estimate_and_says_so_in_the_deck(
     ],
 )
 def test_an_estimate_that_cannot_be_made_is_refused(options: list[str], message: str) -> None:
-    made = new(*SPHERE, *PLATE, *options)
-    assert_unusable(made)
-    assert message in made.stderr
+    answer = new(*SPHERE, *PLATE, *options)
+    assert_unusable(answer)
+    assert message in answer.stderr
 
 
 def test_no_contact_is_estimated_on_a_fabric() -> None:
-    made = new("--fixture", "D7136", *PLATE[:4], "--material", "AS4-5H/3501-6", *QUICK)
-    assert_unusable(made)
-    assert "the ply is a fabric" in made.stderr
-    assert "`fecm indent hertz --et E3`" in made.stderr
+    answer = new("--fixture", "D7136", *PLATE[:4], "--material", "AS4-5H/3501-6", *QUICK)
+    assert_unusable(answer)
+    assert "the ply is a fabric" in answer.stderr
+    assert "`fecm indent hertz --et E3`" in answer.stderr
 
 
 def test_the_mesh_of_a_window_is_obeyed_whatever_the_radius_of_the_patch() -> None:

@@ -65,11 +65,11 @@ def deviations(seed: int) -> list[float]:
     """Fitted minus true values over their standard errors, from a noisy measurement."""
     force = measured()
     noise = NOISE * force.max() * np.random.default_rng(seed).normal(size=len(TIME))
-    found = fecm.identify(started(), TIME, force + noise, FREE)
-    assert found.converged
-    assert not found.notes
-    assert found.share == pytest.approx(NOISE, rel=0.25)
-    return [(found.values[name] - TRUE[name]) / found.errors[name] for name in FREE]
+    fit = fecm.identify(started(), TIME, force + noise, FREE)
+    assert fit.converged
+    assert not fit.notes
+    assert fit.share == pytest.approx(NOISE, rel=0.25)
+    return [(fit.values[name] - TRUE[name]) / fit.errors[name] for name in FREE]
 
 
 def test_the_true_parameters_are_found_from_a_noisy_force_of_another_mesh() -> None:
@@ -78,23 +78,23 @@ def test_the_true_parameters_are_found_from_a_noisy_force_of_another_mesh() -> N
 
 def test_the_fitted_deck_has_no_cards_of_the_deck_that_was_read() -> None:
     deck = fecm.read_one(started().to_text())
-    found = fecm.identify(deck, TIME, measured(), ["k"])
+    fit = fecm.identify(deck, TIME, measured(), ["k"])
     assert deck.text
-    assert found.deck.text == ""
-    assert f"{found.values['k']:.5g}" == f"{found.deck.require(Indentation).k:.5g}"
+    assert fit.deck.text == ""
+    assert f"{fit.values['k']:.5g}" == f"{fit.deck.require(Indentation).k:.5g}"
 
 
 def test_fitted_values_have_the_units_of_the_deck() -> None:
-    found = fecm.identify(started(), TIME, measured(), ["k", "mass", "delay", "offset"])
-    assert found.units == {"length": "mm", "force": "N", "time": "s"}
-    units = {name: found.unit(name) for name in found.values}
+    fit = fecm.identify(started(), TIME, measured(), ["k", "mass", "delay", "offset"])
+    assert fit.units == {"length": "mm", "force": "N", "time": "s"}
+    units = {name: fit.unit(name) for name in fit.values}
     assert units == {"k": "N/mm^1.5", "mass": "N*s^2/mm", "delay": "s", "offset": "N"}
-    (line,) = (line for line in str(found).split("\n") if line.startswith("mass ") and " g" in line)
+    (line,) = (line for line in str(fit).split("\n") if line.startswith("mass ") and " g" in line)
     _, value, unit, _, _, start, _ = line.split()
-    assert float(value) == pytest.approx(1e6 * found.values["mass"], rel=1e-4)  # g in a tonne
+    assert float(value) == pytest.approx(1e6 * fit.values["mass"], rel=1e-4)  # g in a tonne
     assert (unit, start) == ("g", "23")
     with pytest.raises(KeyError, match="velocity was not fitted"):
-        found.unit("velocity")
+        fit.unit("velocity")
 
 
 def test_velocity_and_energy_are_not_fitted_together() -> None:
@@ -107,10 +107,10 @@ def test_true_parameters_are_within_two_standard_errors_in_95_of_100_cases() -> 
     bias = fecm.identify(started(), TIME, measured(), FREE)
     # The meshes differ by far less than the noise.
     assert bias.share < NOISE / 20
-    found = np.array([deviations(seed) for seed in range(100)])
-    inside = np.count_nonzero(np.abs(found) < 2.0, axis=0)
+    values = np.array([deviations(seed) for seed in range(100)])
+    inside = np.count_nonzero(np.abs(values) < 2.0, axis=0)
     assert (np.abs(inside - 95) <= 4).all(), inside
-    assert np.std(found, axis=0) == pytest.approx(np.ones(4), abs=0.2)
+    assert np.std(values, axis=0) == pytest.approx(np.ones(4), abs=0.2)
 
 
 # What a measurement does not determine -----------------------------------------------------------
@@ -148,8 +148,8 @@ def test_k_mass_and_velocity_are_one_too_many_for_hertzs_contact(tmp_path: Path)
     for name in ("k", "mass", "velocity"):
         assert name in done.stderr
     assert "fecm: error: the " in done.stderr
-    found = fecm.identify(deck, result.time, result.force, ["k", "velocity"])
-    assert found.values == pytest.approx({"k": 1.2e5, "velocity": 100.0})
+    fit = fecm.identify(deck, result.time, result.force, ["k", "velocity"])
+    assert fit.values == pytest.approx({"k": 1.2e5, "velocity": 100.0})
 
 
 def test_one_unloading_gives_one_permanent_indentation_and_not_its_line() -> None:
@@ -174,14 +174,14 @@ def test_the_filter_and_the_delay_of_the_measurement_are_part_of_the_fit() -> No
     seen = filter_of("first-order:2e-5")(clock, force)
     free = ["k", "velocity", "delay"]
     deck = plate(12, 4e-7, **{**TRUE, "k": 1e5, "velocity": 2700.0})
-    found = fecm.identify(deck, clock + 3e-5, seen, free, filter="first-order:2e-5")
-    assert found.values["velocity"] == pytest.approx(3000.0, rel=5e-3)
-    assert found.values["k"] == pytest.approx(1.2e5, rel=1e-2)
-    assert found.values["delay"] == pytest.approx(3e-5, abs=3e-7)
-    assert found.share < 2e-3
-    above, below = force_fit_picture(found, {}).figure.axes
+    fit = fecm.identify(deck, clock + 3e-5, seen, free, filter="first-order:2e-5")
+    assert fit.values["velocity"] == pytest.approx(3000.0, rel=5e-3)
+    assert fit.values["k"] == pytest.approx(1.2e5, rel=1e-2)
+    assert fit.values["delay"] == pytest.approx(3e-5, abs=3e-7)
+    assert fit.share < 2e-3
+    above, below = force_fit_picture(fit, {}).figure.axes
     lines = (*above.lines, below.lines[0])
-    for line, values in zip(lines, (found.force, found.model, found.residual), strict=True):
+    for line, values in zip(lines, (fit.force, fit.model, fit.residual), strict=True):
         np.testing.assert_array_equal(np.asarray(line.get_ydata(), dtype=float), values)
 
 

@@ -71,9 +71,9 @@ def noisy(force: Floats, seed: int) -> Floats:
 
 def deviations(seed: int, free: list[str]) -> list[float]:
     """Fitted minus true values over their standard errors."""
-    found = fecm.identify(started(), HUMPS, noisy(humps(), seed), free)
-    assert found.accepted
-    return [(found.values[name] - TRUE[name]) / found.errors[name] for name in free]
+    fit = fecm.identify(started(), HUMPS, noisy(humps(), seed), free)
+    assert fit.accepted
+    return [(fit.values[name] - TRUE[name]) / fit.errors[name] for name in free]
 
 
 def assert_inside(seeds: Iterable[int]) -> Floats:
@@ -81,9 +81,9 @@ def assert_inside(seeds: Iterable[int]) -> Floats:
     free = ["k", "mass", "velocity"]
     without = np.array([deviations(seed, free) for seed in seeds])
     assert np.abs(without).max() < 4.0
-    found = np.array([deviations(seed, [*free, "delay"]) for seed in seeds])
-    assert np.abs(found).max() < 4.0
-    return found
+    values = np.array([deviations(seed, [*free, "delay"]) for seed in seeds])
+    assert np.abs(values).max() < 4.0
+    return values
 
 
 @pytest.mark.filterwarnings("ignore:. of 240 points:fecm.FecmWarning")
@@ -115,8 +115,8 @@ def test_wrong_supports_are_called_a_wrong_model_and_not_a_delay(free: list[str]
 def test_a_wrong_model_that_is_not_refused_is_not_accepted() -> None:
     force = humps()[::-1].copy()  # the largest hump first
     with pytest.warns(fecm.FecmWarning, match="the model does not describe the data"):
-        found = fecm.identify(started(), HUMPS, force, ["velocity"])
-    assert not found.accepted
+        fit = fecm.identify(started(), HUMPS, force, ["velocity"])
+    assert not fit.accepted
 
 
 @pytest.mark.parametrize("deviation", [0.05, 0.5, 3.0])
@@ -183,20 +183,20 @@ def doubted() -> fecm.Deck:
 
 
 def found_inside(force: Floats, more: list[str], errors: float) -> fecm.Identification:
-    found = fecm.identify(doubted(), LONG, force, ["k", "mass", "velocity", *more])
-    assert found.accepted
-    for name, value in found.values.items():
-        assert abs(value - HEAVY[name]) < errors * found.errors[name], name
-    return found
+    fit = fecm.identify(doubted(), LONG, force, ["k", "mass", "velocity", *more])
+    assert fit.accepted
+    for name, value in fit.values.items():
+        assert abs(value - HEAVY[name]) < errors * fit.errors[name], name
+    return fit
 
 
 def test_an_offset_is_fitted_or_proposed() -> None:
     force = recorded(offset=BASE)
     found_inside(force, ["offset"], errors=3.0)
     with pytest.warns(fecm.FecmWarning, match=r"fit offset too: with offset 5\d\.\d N the rms"):
-        found = fecm.identify(doubted(), LONG, force, ["k", "mass", "velocity"])
-    assert (found.accepted, found.verdict) == (False, "no")
-    assert found.doubts[0] == found.notes[0]
+        fit = fecm.identify(doubted(), LONG, force, ["k", "mass", "velocity"])
+    assert (fit.accepted, fit.verdict) == (False, "no")
+    assert fit.doubts[0] == fit.notes[0]
 
 
 def test_an_offset_shows_before_the_contact_though_the_model_is_wrong() -> None:
@@ -211,8 +211,8 @@ def test_an_offset_shows_before_the_contact_though_the_model_is_wrong() -> None:
 def test_a_delay_is_fitted_or_proposed(late: float) -> None:
     force = recorded(delay=late)
     with pytest.warns(fecm.FecmWarning, match=rf"fit delay too: with delay {late:.1g}\d* s"):
-        found = fecm.identify(doubted(), LONG, force, ["k", "mass", "velocity"])
-    assert not found.accepted
+        fit = fecm.identify(doubted(), LONG, force, ["k", "mass", "velocity"])
+    assert not fit.accepted
 
 
 def test_delay_and_offset_are_fitted_together() -> None:
@@ -234,11 +234,11 @@ def test_points_of_the_contact_beyond_the_run_are_refused_and_others_are_not() -
     time, force = _heavy_force()
     force = np.interp(longer, time, force, right=0.0)
     with pytest.warns(fecm.FecmWarning, match="9000 of 10000 points are outside"):
-        found = fecm.identify(doubted(), longer, force, ["k", "mass", "velocity"])
-    assert "9000 of 10000 points are outside the run of the deck and left out" in found.notes
+        fit = fecm.identify(doubted(), longer, force, ["k", "mass", "velocity"])
+    assert "9000 of 10000 points are outside the run of the deck and left out" in fit.notes
     # The contact is inside the run: the points left out are a remark and no reason to doubt.
-    assert not any("outside" in doubt for doubt in found.doubts)
-    assert found.verdict == ("with doubts" if found.doubts else "yes")
+    assert not any("outside" in doubt for doubt in fit.doubts)
+    assert fit.verdict == ("with doubts" if fit.doubts else "yes")
     short = HUMPS < 1.7e-4
     deck = started().with_(duration=1.2e-4)
     with pytest.raises(StudyError, match="more than 20 % of the points of the contact"):
@@ -252,7 +252,7 @@ def test_points_of_the_contact_beyond_the_run_are_refused_and_others_are_not() -
 def test_errors_of_the_plate_are_those_of_a_fit_with_another_plate() -> None:
     free = ["k", "mass", "velocity", "offset"]
     force = np.interp(LONG, *_heavy_force()) + BASE
-    found = fecm.identify(doubted(), LONG, force, free)
+    fit = fecm.identify(doubted(), LONG, force, free)
     e1 = doubted().require(fecm.deck.model.Material).ply.e1
     for name, other in (
         ("thickness", doubted().with_(thickness=1.01 * 16 * 0.18)),
@@ -260,9 +260,9 @@ def test_errors_of_the_plate_are_those_of_a_fit_with_another_plate() -> None:
     ):
         again = fecm.identify(other, LONG, force, free)
         for one in free[:3]:
-            change = again.values[one] - found.values[one]
+            change = again.values[one] - fit.values[one]
             expected = pytest.approx(change, rel=0.1)
-            assert found.plate_errors[name][one] == expected, (name, one)
+            assert fit.plate_errors[name][one] == expected, (name, one)
 
 
 # The command --------------------------------------------------------------------------------------
@@ -299,15 +299,15 @@ def test_a_filter_that_was_not_named_is_named_with_its_rise_time() -> None:
     measured = np.interp(HUMPS, clock, filter_of(f"first-order:{rise}")(clock, force))
     measured += 0.005 * measured.max() * np.random.default_rng(0).normal(size=len(HUMPS))
     free = ["k", "mass", "velocity"]
-    found = fecm.identify(started(), HUMPS, measured, free)
-    assert not found.accepted
-    (named,) = [note for note in found.notes if "seems to be filtered" in note]
+    fit = fecm.identify(started(), HUMPS, measured, free)
+    assert not fit.accepted
+    (named,) = [note for note in fit.notes if "seems to be filtered" in note]
     text = named.partition("--filter ")[2].partition(" ")[0]
     assert float(text.partition(":")[2]) == pytest.approx(rise, rel=0.1)
     right = fecm.identify(started(), HUMPS, measured, free, filter=f"first-order:{rise}")
     assert right.accepted
     assert not any("filter" in note for note in right.notes)
-    assert abs(right.values["k"] / TRUE["k"] - 1.0) < 0.5 * abs(found.values["k"] / TRUE["k"] - 1.0)
+    assert abs(right.values["k"] / TRUE["k"] - 1.0) < 0.5 * abs(fit.values["k"] / TRUE["k"] - 1.0)
 
 
 def test_runs_of_equal_signs_are_counted_in_standard_deviations() -> None:

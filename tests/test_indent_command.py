@@ -18,8 +18,8 @@ from tests.indentation_tests import ALPHA_P, S_P, K, Q, make_test, noisy, writte
 
 
 def test_a_curve_of_the_deck_fits_back_to_the_decks_card(tmp_path: Path) -> None:
-    made = call("indent", "curve", LONG, "--path", "1e-3,0,2e-3,8e-4,3e-3,0", "--points", 60)
-    rows = list(csv.DictReader(io.StringIO(made.stdout)))
+    answer = call("indent", "curve", LONG, "--path", "1e-3,0,2e-3,8e-4,3e-3,0", "--points", 60)
+    rows = list(csv.DictReader(io.StringIO(answer.stdout)))
     assert len(rows) == 1 + 6 * 60
     at_peak = rows[60]
     assert float(at_peak["indentation"]) == 1e-3
@@ -32,7 +32,7 @@ def test_a_curve_of_the_deck_fits_back_to_the_decks_card(tmp_path: Path) -> None
         "unloading",
         "reloading",
     ]
-    (tmp_path / "test.csv").write_text(made.stdout)
+    (tmp_path / "test.csv").write_text(answer.stdout)
     done = call("indent", "fit", tmp_path / "test.csv")
     assert done.exit_code == 0
     assert done.stdout.splitlines()[-2:] == ["EXPE", " 1912000.0 0.0006564     0.094       2.0"]
@@ -42,8 +42,8 @@ def test_a_curve_has_the_units_of_the_deck_in_which_it_is_read(tmp_path: Path) -
     named = LONG.read_text().replace("COOR", "UNIT\nin lbf s\nCOOR", 1)
     (tmp_path / "named.inp").write_text(named)
     path = ("--path", "1e-3,0,2e-3,8e-4,3e-3,0", "--points", 60)
-    made = call("indent", "curve", "named.inp", *path, "-o", "test.csv", cwd=tmp_path)
-    assert made.exit_code == 0
+    answer = call("indent", "curve", "named.inp", *path, "-o", "test.csv", cwd=tmp_path)
+    assert answer.exit_code == 0
     assert (tmp_path / "test.csv").read_text().startswith("indentation (in),force (lbf),branch\n")
     done = call("indent", "fit", "test.csv", cwd=tmp_path)
     assert "units           in, lbf" in done.stdout
@@ -53,12 +53,12 @@ def test_a_curve_has_the_units_of_the_deck_in_which_it_is_read(tmp_path: Path) -
 def test_a_fit_for_programs_has_every_value_with_its_error(tmp_path: Path) -> None:
     a, f = make_test()
     file = written(tmp_path / "test.csv", a, noisy(f, 0))
-    found = json.loads(call("indent", "fit", file, "--format", "json").stdout)
+    document = json.loads(call("indent", "fit", file, "--format", "json").stdout)
     for name, truth in (("k", K), ("n", 1.5), ("q", Q), ("s_p", S_P), ("alpha_p", ALPHA_P)):
-        assert abs(found[name]["value"] - truth) < 4.0 * found[name]["error"]
-    assert len(found["cycles"]) == 4
-    assert set(found["cycles"][0]) >= {"alpha_m", "alpha_0", "k_1"}
-    assert found["card"].startswith("EXPE\n")
+        assert abs(document[name]["value"] - truth) < 4.0 * document[name]["error"]
+    assert len(document["cycles"]) == 4
+    assert set(document["cycles"][0]) >= {"alpha_m", "alpha_0", "k_1"}
+    assert document["card"].startswith("EXPE\n")
 
 
 def test_a_test_that_never_unloads_tells_k_and_n_alone(tmp_path: Path) -> None:
@@ -147,17 +147,17 @@ def test_the_picture_of_a_fit_holds_every_point_and_the_line() -> None:
     from fecm.plot.studies import indentation_fit_picture as draw
 
     a, f = make_test()
-    found = fit_contact_law(a, noisy(f, 0))
-    figure = draw(a, noisy(f, 0), found, {"length": "in", "force": "lbf"}).figure
+    fit = fit_contact_law(a, noisy(f, 0))
+    figure = draw(a, noisy(f, 0), fit, {"length": "in", "force": "lbf"}).figure
     curves, line = figure.axes
     assert curves.get_xlabel() == "Indentation (10⁻³ in)"
     assert line.get_ylabel() == "Permanent indentation (10⁻³ in)"
     drawn = [np.asarray(one.get_xdata()) for one in curves.get_lines() if one.get_marker() == "."]
     assert sum(map(len, drawn)) == len(a) - 7  # all but the points at the turns
     x, y = map(np.asarray, line.get_lines()[-1].get_data())
-    assert found.line is not None
+    assert fit.line is not None
     slope = (y[-1] - y[-2]) / (x[-1] - x[-2])
-    assert slope == pytest.approx(found.line.s_p.value, rel=1e-9)
+    assert slope == pytest.approx(fit.line.s_p.value, rel=1e-9)
 
 
 @pytest.mark.parametrize("options", [("--path", "2e-3,0"), ("--rigidity", "--q", "2.5")])
@@ -214,27 +214,29 @@ def test_files_of_testing_machines_give_the_same_law(
     file = machine(tmp_path / "test.csv", head, sizes, separator, mark)
     done = call("indent", "fit", file, "--format", "json")
     assert done.exit_code == 0, done.stderr
-    found = json.loads(done.stdout)
+    document = json.loads(done.stdout)
     length, force = {
         None: (1.0, 1.0),
         ("in", "lbf"): (1.0, 1.0),
         ("mm", "N"): (MM, NEWTON),
         ("m", "N"): (1000 * MM, NEWTON),
     }[units]
-    assert found["units"] == (dict(zip(("length", "force"), units, strict=True)) if units else None)
-    assert found["k"]["value"] == pytest.approx(K / force * length**1.5, rel=1e-6)
-    assert found["alpha_p"]["value"] == pytest.approx(ALPHA_P / length, rel=1e-3)
+    assert document["units"] == (
+        dict(zip(("length", "force"), units, strict=True)) if units else None
+    )
+    assert document["k"]["value"] == pytest.approx(K / force * length**1.5, rel=1e-6)
+    assert document["alpha_p"]["value"] == pytest.approx(ALPHA_P / length, rel=1e-3)
 
 
 def test_a_fit_states_the_units_of_its_card(tmp_path: Path) -> None:
     file = machine(tmp_path / "test.csv", "Stroke (mm),Load (kN)", (MM, KN), ",", ".")
-    told = call("indent", "fit", file).stdout
-    assert "units           mm, N (the test: mm, kN)\nEXPE\n" in told
-    told = call("indent", "fit", file, "--unit", "in,lbf").stdout
-    assert "units           in, lbf (the test: mm, kN)\nEXPE\n 1330000.0" in told
+    stdout = call("indent", "fit", file).stdout
+    assert "units           mm, N (the test: mm, kN)\nEXPE\n" in stdout
+    stdout = call("indent", "fit", file, "--unit", "in,lbf").stdout
+    assert "units           in, lbf (the test: mm, kN)\nEXPE\n 1330000.0" in stdout
     plain = written(tmp_path / "plain.csv", *make_test())
-    told = call("indent", "fit", plain).stdout
-    assert "units           not named in the test\nEXPE\n" in told
+    stdout = call("indent", "fit", plain).stdout
+    assert "units           not named in the test\nEXPE\n" in stdout
 
 
 @pytest.mark.parametrize("columns", ["3,2", "way,push", "WAY,2"])

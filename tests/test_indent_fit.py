@@ -99,10 +99,10 @@ def test_a_test_without_noise_gives_the_constants_themselves() -> None:
 
 def test_a_fit_explains_what_noise_leaves() -> None:
     a, f = make_test()
-    found = fit_contact_law(a, noisy(f, 0))
-    assert found.scatter == pytest.approx(0.01, rel=0.05)
+    fit = fit_contact_law(a, noisy(f, 0))
+    assert fit.scatter == pytest.approx(0.01, rel=0.05)
     for kind in ("loading", "unloading", "reloading"):
-        share = found.r_squared[kind]
+        share = fit.r_squared[kind]
         assert share is not None
         assert 0.99 < share < 1.0
 
@@ -135,13 +135,13 @@ def test_partial_unloadings_reload_from_an_origin_of_their_own() -> None:
         ],
         axis=1,
     )
-    found = fit_contact_law(a, f)
-    assert [cycle.alpha_0.value for cycle in found.cycles] == pytest.approx([left, last], rel=1e-5)
-    measured = found.cycles[0].k_1_measured
+    fit = fit_contact_law(a, f)
+    assert [cycle.alpha_0.value for cycle in fit.cycles] == pytest.approx([left, last], rel=1e-5)
+    measured = fit.cycles[0].k_1_measured
     assert measured is not None
     assert measured.value == pytest.approx(K * (peak / (peak - origin)) ** 1.5, rel=1e-5)
-    assert found.line is not None
-    assert found.line.alpha_p.value == pytest.approx(ALPHA_P, rel=1e-4)
+    assert fit.line is not None
+    assert fit.line.alpha_p.value == pytest.approx(ALPHA_P, rel=1e-4)
 
 
 @pytest.mark.parametrize("part", [0.0, 0.005, 0.01])
@@ -161,41 +161,41 @@ def test_a_peak_reached_twice_is_one_cycle() -> None:
     k_1 = K * (2e-3 / (2e-3 - left)) ** 1.5
     back = stretch(0.0, 2e-3, 100, lambda a: k_1 * np.maximum(a - left, 0.0) ** 1.5)
     again = np.concatenate([[a, f], back, [a[101:], f[101:]]], axis=1)
-    found = fit_contact_law(again[0], noisy(again[1], 0))
-    assert len(found.cycles) == 1
+    fit = fit_contact_law(again[0], noisy(again[1], 0))
+    assert len(fit.cycles) == 1
 
 
 def test_cycles_below_alpha_p_leave_nothing_and_do_not_bend_the_line() -> None:
-    found = fit_contact_law(*make_test((3e-4, 5e-4, 2e-3, 4e-3)))
-    assert found.line is not None
-    assert found.line.elastic == (0, 1)
-    assert found.line.s_p.value == pytest.approx(S_P, rel=1e-6)
-    assert found.line.alpha_p.value == pytest.approx(ALPHA_P, rel=1e-6)
+    fit = fit_contact_law(*make_test((3e-4, 5e-4, 2e-3, 4e-3)))
+    assert fit.line is not None
+    assert fit.line.elastic == (0, 1)
+    assert fit.line.s_p.value == pytest.approx(S_P, rel=1e-6)
+    assert fit.line.alpha_p.value == pytest.approx(ALPHA_P, rel=1e-6)
 
 
 def test_hertz_own_curve_has_no_peak_in_it_and_the_recorded_one_is_taken() -> None:
-    found = fit_contact_law(*make_test((2e-3,), q=1.5, s_p=0.0))
-    assert found.q is not None
-    assert found.q.value == pytest.approx(1.5, abs=1e-6)
-    assert found.cycles[0].alpha_m == FittedValue(2e-3, 0.0)
+    fit = fit_contact_law(*make_test((2e-3,), q=1.5, s_p=0.0))
+    assert fit.q is not None
+    assert fit.q.value == pytest.approx(1.5, abs=1e-6)
+    assert fit.cycles[0].alpha_m == FittedValue(2e-3, 0.0)
 
 
 def test_permanent_indentations_off_the_line_enlarge_its_errors() -> None:
     # One specimen of four stays 30 % deeper: nothing that the forces' noise could do.
     parts = [make_test((peak,), s_p=S_P * (1.3 if n == 1 else 1.0)) for n, peak in enumerate(PEAKS)]
     both = [np.concatenate([part[axis] for part in parts]) for axis in (0, 1)]
-    found = fit_contact_law(both[0], noisy(both[1], 0, 1e-4))
-    assert found.line is not None
-    assert found.line.scatter > 3.0
+    fit = fit_contact_law(both[0], noisy(both[1], 0, 1e-4))
+    assert fit.line is not None
+    assert fit.line.scatter > 3.0
 
 
 @pytest.mark.parametrize(("share", "side"), [(0.5, "above"), (1.0, ""), (1.5, "below")])
 def test_a_line_on_one_side_of_all_its_points_is_noted(share: float, side: str) -> None:
     a, f = make_test()
-    found = fit_contact_law(a, noisy(f, 0))
-    assert found.line is not None
-    start = replace(found.line.alpha_p, value=share * found.line.alpha_p.value)
-    told = "; ".join(fit_notes(replace(found, line=replace(found.line, alpha_p=start))))
+    fit = fit_contact_law(a, noisy(f, 0))
+    assert fit.line is not None
+    start = replace(fit.line.alpha_p, value=share * fit.line.alpha_p.value)
+    told = "; ".join(fit_notes(replace(fit, line=replace(fit.line, alpha_p=start))))
     assert (f"is {side} all of its points" in told) is bool(side)
 
 

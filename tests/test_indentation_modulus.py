@@ -39,8 +39,8 @@ def test_effective_stiffness_and_modulus_are_those_of_the_reference(layup: str) 
     angles = LAYUPS[layup]
     C = effective_stiffness(T300, angles, [1.0] * len(angles), 0.4)
     expected = [float(row[name]) for name in ("C11", "C13", "C33", "C44", "C55")]
-    found = [C[0, 0], C[0, 2], C[2, 2], C[3, 3], C[4, 4]]
-    np.testing.assert_allclose(found, expected, rtol=5e-6)
+    values = [C[0, 0], C[0, 2], C[2, 2], C[3, 3], C[4, 4]]
+    np.testing.assert_allclose(values, expected, rtol=5e-6)
     assert 1.0 / np.linalg.inv(C)[2, 2] == pytest.approx(float(row["E3 effective"]), rel=5e-6)
     modulus = indentation_modulus(C)
     assert modulus == pytest.approx(float(row["indentation modulus M (Barnett-Lothe)"]), rel=1e-6)

@@ -431,8 +431,8 @@ def test_a_result_that_a_reader_has_open_is_replaced_without_disturbing_it(tmp_p
         (tmp_path / "d.inp").write_text(small(data=DATA_CARDS.replace("115.0", " 90.0")))
         assert call("run", "d.inp", "--overwrite", cwd=tmp_path).exit_code == 0
         np.testing.assert_array_equal(reader["history/force"][:], before)
-    found = fecm.load(tmp_path / "d.h5")
-    assert found.force.max() < before.max()
+    result = fecm.load(tmp_path / "d.h5")
+    assert result.force.max() < before.max()
 
 
 # Energy ------------------------------------------------------------------------------------------

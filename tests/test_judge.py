@@ -254,17 +254,17 @@ def test_bounds_hold_whatever_the_open_draws_are() -> None:
 def test_a_velocity_is_found_whatever_the_duration_of_the_deck() -> None:
     energies = []
     for duration in (3e-3, WHOLE):
-        found = fecm.sweep(soft(duration), until="threshold")
-        energies.append(found["found_energy"][0])
-        assert found["validity"].tolist() == ["w > 0.3 h"]
+        sweep_result = fecm.sweep(soft(duration), until="threshold")
+        energies.append(sweep_result["found_energy"][0])
+        assert sweep_result["validity"].tolist() == ["w > 0.3 h"]
     np.testing.assert_allclose(energies, energies[-1], rtol=1e-5)
 
 
 def test_a_search_ends_where_no_run_is_long_enough() -> None:
-    found = fecm.sweep(soft(1e-4), until="threshold")
-    (status,) = found["status"]
+    sweep_result = fecm.sweep(soft(1e-4), until="threshold")
+    (status,) = sweep_result["status"]
     assert "open even in a run 8 times as long" in status
-    assert found["validity"].tolist() == ["failed"]
+    assert sweep_result["validity"].tolist() == ["failed"]
 
 
 def test_cases_together_and_full_runs_are_judged_alike() -> None:
@@ -418,9 +418,9 @@ def test_a_sweep_counts_what_is_beyond_its_model(tmp_path: Path) -> None:
     assert last.startswith("3 cases: 2 beyond the linear plate (w > 0.3 h, up to 3.")
     assert last.endswith("h), 1 elastic predictions (peak force > threshold)")
     assert "therefore too high (unsafe)" in done.stderr
-    found = fecm.load_sweep(tmp_path / "s.h5")
-    assert found["validity"].tolist() == ["ok", "w > 0.3 h", "w > 0.3 h; peak force > threshold"]
-    picture: Any = draw("map", {"s": found}).figure
+    loaded = fecm.load_sweep(tmp_path / "s.h5")
+    assert loaded["validity"].tolist() == ["ok", "w > 0.3 h", "w > 0.3 h; peak force > threshold"]
+    picture: Any = draw("map", {"s": loaded}).figure
     (axes, *_) = picture.axes
     texts = [text.get_text() for text in picture.findobj(match=Text)]
     assert any("beyond the linear plate (w > 0.3 h): 2 of 3 cases" in text for text in texts)
@@ -429,8 +429,8 @@ def test_a_sweep_counts_what_is_beyond_its_model(tmp_path: Path) -> None:
 
 def test_reasons_of_other_versions_count_together() -> None:
     texts = np.array(["ok", "failed", "", "w > 0.3 h; moon full", "sun low"])
-    found = {doubt.reason: some.tolist() for doubt, some in counted(texts)}
-    assert found == {
+    by_name = {doubt.reason: some.tolist() for doubt, some in counted(texts)}
+    assert by_name == {
         "w > 0.3 h": [False, False, False, True, False],
         "other": [False, False, False, True, True],
     }

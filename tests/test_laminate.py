@@ -57,8 +57,8 @@ def assert_same(found: Floats, expected: Floats, scale: float | None = None) -> 
 
 def test_a_ply_has_the_reference_files_plane_stress_stiffness() -> None:
     q = reduced_stiffness(REPORT_PLY)
-    found = np.array([q[0, 0], q[1, 1], q[0, 1], q[2, 2]])
-    assert_same(found, np.array([REFERENCE[name] for name in ("Q11", "Q22", "Q12", "Q66")]))
+    values = np.array([q[0, 0], q[1, 1], q[0, 1], q[2, 2]])
+    assert_same(values, np.array([REFERENCE[name] for name in ("Q11", "Q22", "Q12", "Q66")]))
     assert np.array_equal(q, q.T)
     assert q[0, 2] == q[1, 2] == 0.0
 

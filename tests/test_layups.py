@@ -64,11 +64,11 @@ def layups(draw: st.DrawFn) -> Item:
     """A layup without separators, and its plies."""
     minus = draw(st.sampled_from(MINUS))
     items = draw(st.lists(plies(minus), min_size=1, max_size=5))
-    found = [angle for _, own in items for angle in own]
+    values = [angle for _, own in items for angle in own]
     text = f"[{'|'.join(one for one, _ in items)}]"
     if draw(st.booleans()):
-        text, found = text + draw(st.sampled_from(MIRRORS)), found + found[::-1]
-    return text, found
+        text, values = text + draw(st.sampled_from(MIRRORS)), values + values[::-1]
+    return text, values
 
 
 @settings(max_examples=40)

@@ -239,11 +239,11 @@ def test_a_thick_plate_and_a_coarse_curved_panel_are_open() -> None:
 def test_the_exposure_at_a_centre_does_not_depend_on_the_points_of_stress() -> None:
     deck = impact_on(8).to_text()
     (card,) = [line for line in deck.splitlines() if line.split()[:3] == ["3", "3", "-3"]]
-    found = []
+    values = []
     for points in (-3, 2, 4):
         changed = card.replace("-3", f"{points:2d}", 1)
-        found.append(exposures(fecm.run_one(deck.replace(card, changed)))["interlaminar"])
-    assert found == pytest.approx([found[0]] * 3, rel=1e-6)
+        values.append(exposures(fecm.run_one(deck.replace(card, changed)))["interlaminar"])
+    assert values == pytest.approx([values[0]] * 3, rel=1e-6)
 
 
 @pytest.mark.long

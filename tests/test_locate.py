@@ -118,28 +118,28 @@ def test_the_run_of_a_gage_gives_the_strains_of_an_impulse(
 
 def test_the_place_and_the_force_of_a_run_are_found() -> None:
     deck, strains, peak = struck()
-    found = fecm.locate(deck, (TIME, strains), region=NEAR, grid=12.0)
-    assert distance(found, STRUCK) < 0.1  # of elements of 10
-    assert found.peak_force == pytest.approx(peak, rel=0.05)
-    assert found.impulse == pytest.approx(2e-6 * 2000.0, rel=0.05)  # hardly a rebound
-    assert found.accepted
+    location = fecm.locate(deck, (TIME, strains), region=NEAR, grid=12.0)
+    assert distance(location, STRUCK) < 0.1  # of elements of 10
+    assert location.peak_force == pytest.approx(peak, rel=0.05)
+    assert location.impulse == pytest.approx(2e-6 * 2000.0, rel=0.05)  # hardly a rebound
+    assert location.accepted
 
 
 def test_an_impact_on_a_curved_panel_is_found() -> None:
     deck = curved(panel("[0/90/45/45]"))
     run = fecm.run_one(deck)
-    found = fecm.locate(deck, (TIME, at_times(run)), region=CLOSE, grid=10.0)
-    assert distance(found, STRUCK) < 0.2
-    assert found.peak_force == pytest.approx(float(run.force.max()), rel=0.05)
+    location = fecm.locate(deck, (TIME, at_times(run)), region=CLOSE, grid=10.0)
+    assert distance(location, STRUCK) < 0.2
+    assert location.peak_force == pytest.approx(float(run.force.max()), rel=0.05)
 
 
 @pytest.mark.long
 def test_an_impact_beside_the_edge_is_found() -> None:
     place = (60.0, 6.0)
     deck, strains, peak = struck(at=place)
-    found = fecm.locate(deck, (TIME, strains), region=(48.0, 0.0, 76.0, 30.0), grid=14.0)
-    assert distance(found, place) < 0.5
-    assert found.peak_force == pytest.approx(peak, rel=0.05)
+    location = fecm.locate(deck, (TIME, strains), region=(48.0, 0.0, 76.0, 30.0), grid=14.0)
+    assert distance(location, place) < 0.5
+    assert location.peak_force == pytest.approx(peak, rel=0.05)
     at_edge = fecm.locate(deck, (TIME, strains), region=(40.0, 0.0, 80.0, 5.01), grid=12.0)
     assert 0.0 < at_edge.sd_y < np.inf
     assert not at_edge.accepted
@@ -153,28 +153,28 @@ def of_the_series(deck: fecm.Deck, strains: Floats, **options: object) -> fecm.L
 
 @pytest.mark.parametrize("mesh", [(30, 20), pytest.param((60, 40), marks=pytest.mark.long)])
 def test_the_public_case_is_located_within_four_standard_deviations(mesh: tuple[int, int]) -> None:
-    found = of_the_series(public_panel(*mesh), PUBLIC[:, 6:10])
-    assert distance(found, PUBLIC_PLACE) < 0.5
-    assert deviations(found, PUBLIC_PLACE) < 4.0
-    early = found.time < 6e-4
-    assert found.force[early].max() == pytest.approx(PUBLIC_PEAK, rel=0.05)
-    assert found.impulse == pytest.approx(PUBLIC_IMPULSE, rel=0.05)
+    series = of_the_series(public_panel(*mesh), PUBLIC[:, 6:10])
+    assert distance(series, PUBLIC_PLACE) < 0.5
+    assert deviations(series, PUBLIC_PLACE) < 4.0
+    early = series.time < 6e-4
+    assert series.force[early].max() == pytest.approx(PUBLIC_PEAK, rel=0.05)
+    assert series.impulse == pytest.approx(PUBLIC_IMPULSE, rel=0.05)
     # Unregularised, the last force would be 1000 times the largest one.
-    assert found.peak_force == found.force[early].max()
-    assert 6e-4 < found.determined_until < 7.8e-4
-    assert not found.determined[-1]
-    assert found.force[~found.determined].max() == 0.0
-    assert found.force_sd[~found.determined].min() > 4.0 * np.median(found.force_sd)
-    assert found.accepted
+    assert series.peak_force == series.force[early].max()
+    assert 6e-4 < series.determined_until < 7.8e-4
+    assert not series.determined[-1]
+    assert series.force[~series.determined].max() == 0.0
+    assert series.force_sd[~series.determined].min() > 4.0 * np.median(series.force_sd)
+    assert series.accepted
 
 
 @pytest.mark.long
 def test_the_public_case_is_located_on_the_whole_plate() -> None:
-    found = fecm.locate(public_panel(60, 40), (PUBLIC[:, 0], PUBLIC[:, 6:10]))
-    assert len(found.candidates) == 126
-    assert distance(found, PUBLIC_PLACE) < 0.5
-    assert found.second is not None
-    assert found.second.ratio > 5.0
+    location = fecm.locate(public_panel(60, 40), (PUBLIC[:, 0], PUBLIC[:, 6:10]))
+    assert len(location.candidates) == 126
+    assert distance(location, PUBLIC_PLACE) < 0.5
+    assert location.second is not None
+    assert location.second.ratio > 5.0
 
 
 @pytest.mark.long
@@ -195,7 +195,7 @@ def test_strains_on_the_mesh_of_fecm_new_are_those_of_the_series_within_a_hundre
     # 60 x 40 elements asked for are refined at the patch.
     plain = public_panel(60, 40)
     material = plain.require(model.Material)
-    made = fecm.impact(
+    deck = fecm.impact(
         fecm.Plate.rectangle((300.0, 200.0), (60, 40), support="simple"),
         fecm.Laminate("[0/90/0/90/0]s", material.ply, 0.2),
         fecm.RigidMass(2e-5),
@@ -209,7 +209,7 @@ def test_strains_on_the_mesh_of_fecm_new_are_those_of_the_series_within_a_hundre
         shear_factor=1.0,
         gages=[(g.x, g.y, g.z, g.direction) for g in plain.require(model.Gages).records],
     )
-    run = fecm.run_one(made)
+    run = fecm.run_one(deck)
     for own, series in zip(run.gages.strain.T, PUBLIC[:, 2:6].T, strict=True):
         off = np.interp(PUBLIC[:, 0], run.time, own) - series
         assert np.abs(off).max() < 1e-2 * np.abs(series).max()
@@ -217,9 +217,9 @@ def test_strains_on_the_mesh_of_fecm_new_are_those_of_the_series_within_a_hundre
 
 @pytest.mark.long
 def test_a_modulus_5_percent_too_high_moves_the_place_by_less_than_a_millimetre() -> None:
-    found = of_the_series(public_panel(60, 40, e1=1.05 * 171420.0), PUBLIC[:, 6:10])
-    assert 0.1 < distance(found, PUBLIC_PLACE) < 1.0
-    assert 1.0 < found.peak_force / PUBLIC_PEAK < 1.07
+    series = of_the_series(public_panel(60, 40, e1=1.05 * 171420.0), PUBLIC[:, 6:10])
+    assert 0.1 < distance(series, PUBLIC_PLACE) < 1.0
+    assert 1.0 < series.peak_force / PUBLIC_PEAK < 1.07
 
 
 @pytest.mark.long
@@ -230,10 +230,10 @@ def test_the_reports_impact_with_a_rod_is_located_within_one_element() -> None:
     run = fecm.run_one(fecm.read_one(deck.to_text()))
     time = 4e-6 * np.arange(1.0, 201.0)
     strains = np.column_stack([np.interp(time, run.time, one) for one in run.gages.strain.T])
-    found = fecm.locate(deck, (time, scatter(strains, NOISE, seed=0)[0]))
+    location = fecm.locate(deck, (time, scatter(strains, NOISE, seed=0)[0]))
     node = run["mesh/coordinates"][report.require(model.Impact).node - 1]
-    assert distance(found, tuple(node)) < 0.02  # elements of .25 in
-    assert found.peak_force == pytest.approx(float(run.force.max()), rel=0.05)
+    assert distance(location, tuple(node)) < 0.02  # elements of .25 in
+    assert location.peak_force == pytest.approx(float(run.force.max()), rel=0.05)
 
 
 # Error bars ---------------------------------------------------------------------------------------
@@ -245,11 +245,11 @@ def test_the_errors_of_several_seeds_are_those_of_the_covariance() -> None:
     seeds, squares = 10, 0.0
     for seed in range(seeds):
         measured, noise = scatter(strains, 2.0 * NOISE, seed)
-        found = fecm.locate(
+        location = fecm.locate(
             deck, (TIME, measured), noise=noise, basis=7.5e-6, region=CLOSE, grid=20.0
         )
-        assert found.misfit == pytest.approx(1.0, abs=0.15)
-        squares += deviations(found, STRUCK) ** 2
+        assert location.misfit == pytest.approx(1.0, abs=0.15)
+        squares += deviations(location, STRUCK) ** 2
     # Chi-square of 2 values a seed: within its 1 % and 99 % quantiles, 8.3 and 37.6 of 20.
     assert 8.3 < squares < 37.6
 
@@ -285,14 +285,14 @@ def test_the_covariance_of_the_place_is_that_of_least_squares() -> None:
     """noise**2 (J' J)^-1 for two gages, with J computed without reciprocity."""
     deck = with_gages(panel(), *OFF_AXIS[:2])
     strains, noise = scatter(struck()[1][:, :2], NOISE, seed=1)
-    found = fecm.locate(
+    location = fecm.locate(
         deck, (TIME, strains), region=CLOSE, grid=20.0, basis=9e-6, noise=noise, mesh_error=False
     )
-    J = strains_per_place_and_force(deck, found)
-    expected = (noise * max(1.0, found.misfit)) ** 2 * np.linalg.inv(J.T @ J)[:2, :2]
-    np.testing.assert_allclose(found.covariance, expected, rtol=0.06)
-    assert found.sd_x == pytest.approx(np.sqrt(expected[0, 0]), rel=0.03)
-    assert found.sd_y == pytest.approx(np.sqrt(expected[1, 1]), rel=0.03)
+    J = strains_per_place_and_force(deck, location)
+    expected = (noise * max(1.0, location.misfit)) ** 2 * np.linalg.inv(J.T @ J)[:2, :2]
+    np.testing.assert_allclose(location.covariance, expected, rtol=0.06)
+    assert location.sd_x == pytest.approx(np.sqrt(expected[0, 0]), rel=0.03)
+    assert location.sd_y == pytest.approx(np.sqrt(expected[1, 1]), rel=0.03)
 
 
 def of_a_run() -> Floats:
@@ -311,10 +311,10 @@ def test_the_95_percent_ellipse_covers_the_place_in_95_of_100(
     with warnings.catch_warnings(action="ignore"):
         for seed in range(100):
             strains, _ = scatter(clean, NOISE, seed)
-            found = of_the_series(deck, strains)
-            covered += deviations(found, PUBLIC_PLACE) ** 2 < -2.0 * np.log(0.05)
-            off.append((found.x - PUBLIC_PLACE[0], found.y - PUBLIC_PLACE[1]))
-            errors.append((found.sd_x, found.sd_y))
+            series = of_the_series(deck, strains)
+            covered += deviations(series, PUBLIC_PLACE) ** 2 < -2.0 * np.log(0.05)
+            off.append((series.x - PUBLIC_PLACE[0], series.y - PUBLIC_PLACE[1]))
+            errors.append((series.sd_x, series.sd_y))
     assert 90 <= covered <= 100
     ratio = np.sqrt(np.mean(np.square(off), axis=0)) / np.mean(errors, axis=0)
     assert (ratio < 1.3).all()
@@ -332,12 +332,12 @@ def test_the_ellipse_encloses_its_share_of_a_normal_distribution() -> None:
 
 def test_the_noise_is_that_of_the_residual_unless_it_is_given() -> None:
     strains, noise = scatter(struck_on_a_point()[1], NOISE, seed=1)
-    found = located(strains)
-    assert found.noise == pytest.approx(noise, rel=0.15)
-    assert found.misfit == 1.0
-    assert not found.noise_given
+    location = located(strains)
+    assert location.noise == pytest.approx(noise, rel=0.15)
+    assert location.misfit == 1.0
+    assert not location.noise_given
     # The mesh is in both.
-    assert found.sd_x == pytest.approx(noisy().sd_x, rel=0.15)
+    assert location.sd_x == pytest.approx(noisy().sd_x, rel=0.15)
 
 
 # The force ----------------------------------------------------------------------------------------
@@ -362,9 +362,9 @@ def test_the_energy_bound_follows_from_impulse_and_mass() -> None:
 def test_a_force_that_has_not_ended_is_said_to_be_open() -> None:
     early = TIME < 1.2e-4
     deck, strains, _ = struck_on_a_point()
-    found = fecm.locate(deck, (TIME[early], strains[early]), region=CLOSE, grid=20.0)
-    assert found.contact_end is None
-    assert any("has not ended" in note for note in found.notes)
+    location = fecm.locate(deck, (TIME[early], strains[early]), region=CLOSE, grid=20.0)
+    assert location.contact_end is None
+    assert any("has not ended" in note for note in location.notes)
 
 
 @pytest.mark.long
@@ -372,9 +372,9 @@ def test_hats_are_narrowed_where_the_strains_show_it_and_a_given_width_is_kept()
     # A thin plate has a force with a narrow peak.
     deck, strains, peak = struck("[0/90/45/45]")
     near: dict[str, object] = {"region": CLOSE, "grid": 20.0}
-    found = fecm.locate(deck, (TIME, strains), **near)  # type: ignore[arg-type]
-    assert np.diff(found.time)[0] < TIME[-1] / 60.0
-    assert found.peak_force == pytest.approx(peak, rel=0.05)
+    location = fecm.locate(deck, (TIME, strains), **near)  # type: ignore[arg-type]
+    assert np.diff(location.time)[0] < TIME[-1] / 60.0
+    assert location.peak_force == pytest.approx(peak, rel=0.05)
     wide = fecm.locate(deck, (TIME, strains), basis=9e-6, **near)  # type: ignore[arg-type]
     assert np.diff(wide.time) == pytest.approx(9e-6)
     assert wide.peak_force < 0.95 * peak
@@ -395,12 +395,12 @@ def test_a_record_that_begins_after_the_impact_is_located_with_a_shift() -> None
     deck, clean, _ = struck_on_a_point()
     strains, noise = scatter(clean, NOISE, seed=2)
     table = TIME[late:] - TIME[late - 1], strains[late:]
-    found = fecm.locate(deck, table, region=CLOSE, grid=20.0, noise=noise, shift=True)
-    assert distance(found, STRUCK) < 0.3
-    assert found.misfit < 1.2
-    first = found.time[np.argmax(found.force > 0.1 * found.peak_force)]
+    location = fecm.locate(deck, table, region=CLOSE, grid=20.0, noise=noise, shift=True)
+    assert distance(location, STRUCK) < 0.3
+    assert location.misfit < 1.2
+    first = location.time[np.argmax(location.force > 0.1 * location.peak_force)]
     assert first == pytest.approx(-TIME[late - 1], abs=1e-5)
-    assert found.sd_shift > 0.0
+    assert location.sd_shift > 0.0
     plain = fecm.locate(deck, table, region=CLOSE, grid=20.0, noise=noise)
     assert not plain.accepted
     assert any("does not describe these signals" in note for note in plain.notes)
@@ -411,29 +411,29 @@ def test_a_record_that_begins_before_the_impact_is_located() -> None:
     time = np.concatenate([before, TIME])
     deck, clean, _ = struck_on_a_point()
     strains = np.vstack([np.zeros((len(before), 3)), clean])
-    found = fecm.locate(deck, (time, strains), region=NEAR, grid=12.0)
-    assert distance(found, STRUCK) < 0.1
-    assert found.force[found.time <= 0.0].max() < 0.05 * found.peak_force
+    location = fecm.locate(deck, (time, strains), region=NEAR, grid=12.0)
+    assert distance(location, STRUCK) < 0.1
+    assert location.force[location.time <= 0.0].max() < 0.05 * location.peak_force
 
 
 def test_a_gage_with_another_gain_is_found_out() -> None:
     strains, noise = scatter(struck_on_a_point()[1], NOISE / 4.0, seed=3)
-    found = located(strains * [1.1, 1.0, 1.0], noise=noise, gains=True)
-    assert found.gains / found.gains[1] == pytest.approx([1.1, 1.0, 1.0], abs=0.01)
-    assert np.prod(found.gains) == pytest.approx(1.0)
-    assert distance(found, STRUCK) < 0.1
-    assert (found.sd_gains > 0.0).all()
+    location = located(strains * [1.1, 1.0, 1.0], noise=noise, gains=True)
+    assert location.gains / location.gains[1] == pytest.approx([1.1, 1.0, 1.0], abs=0.01)
+    assert np.prod(location.gains) == pytest.approx(1.0)
+    assert distance(location, STRUCK) < 0.1
+    assert (location.sd_gains > 0.0).all()
 
 
 @pytest.mark.long
 def test_fine_samples_give_the_place_of_coarse_ones() -> None:
     deck, run = struck_on_a_point()[0], run_of(radius=SMALL)
-    found = fecm.locate(deck, (run.time, np.asarray(run.gages.strain)), region=CLOSE, grid=20.0)
+    location = fecm.locate(deck, (run.time, np.asarray(run.gages.strain)), region=CLOSE, grid=20.0)
     assert len(run.time) > 500
-    assert distance(found, STRUCK) < 0.1
-    assert found.fitted.shape == (3, len(run.time))
-    rest = found.fitted - run.gages.strain.T
-    assert np.abs(rest).max() < 0.02 * np.abs(found.fitted).max()
+    assert distance(location, STRUCK) < 0.1
+    assert location.fitted.shape == (3, len(run.time))
+    rest = location.fitted - run.gages.strain.T
+    assert np.abs(rest).max() < 0.02 * np.abs(location.fitted).max()
     strains, noise = scatter(np.asarray(run.gages.strain), NOISE, seed=5)
     rough = fecm.locate(deck, (run.time, strains), region=CLOSE, grid=20.0)
     assert rough.noise == pytest.approx(noise, rel=0.05)
@@ -445,8 +445,8 @@ def test_unequal_times_give_the_place_of_equal_ones() -> None:
     deck, run = struck_on_a_point()[0], run_of(radius=SMALL)
     time = np.sort(np.random.default_rng(4).uniform(2e-6, TIME[-1], 150))
     strains = np.column_stack([np.interp(time, run.time, one) for one in run.gages.strain.T])
-    found = fecm.locate(deck, (time, strains), region=CLOSE, grid=20.0)
-    assert distance(found, STRUCK) < 0.1
+    location = fecm.locate(deck, (time, strains), region=CLOSE, grid=20.0)
+    assert distance(location, STRUCK) < 0.1
 
 
 @pytest.mark.long
@@ -454,9 +454,9 @@ def test_a_plate_without_patch_projectile_and_program_is_enough() -> None:
     deck = struck()[0]
     unused = (model.Impact, model.Indentation, model.Projectile, model.Patch)
     bare = dataclasses.replace(without(deck, *unused), macros=())
-    found = fecm.locate(bare, (TIME, struck()[1]), region=NEAR, grid=12.0)
-    assert distance(found, STRUCK) < 1.0  # a point for the disc of 5
-    assert found.peak_force == pytest.approx(struck()[2], rel=0.1)
+    location = fecm.locate(bare, (TIME, struck()[1]), region=NEAR, grid=12.0)
+    assert distance(location, STRUCK) < 1.0  # a point for the disc of 5
+    assert location.peak_force == pytest.approx(struck()[2], rel=0.1)
 
 
 # Doubts -------------------------------------------------------------------------------------------
@@ -467,10 +467,10 @@ def test_a_wrong_plate_does_not_describe_the_strains() -> None:
     plate, clean, _ = struck_on_a_point()
     deck = plate.with_(e1=2.0 * 135000.0)
     strains, noise = scatter(clean, NOISE, seed=1)
-    found = fecm.locate(deck, (TIME, strains), region=CLOSE, grid=20.0, noise=noise)
-    assert found.misfit > 3.0
-    assert not found.accepted
-    assert "does not describe these signals" in found.notes[0]
+    location = fecm.locate(deck, (TIME, strains), region=CLOSE, grid=20.0, noise=noise)
+    assert location.misfit > 3.0
+    assert not location.accepted
+    assert "does not describe these signals" in location.notes[0]
 
 
 def wrong(strains: Floats, name: str) -> Floats:
@@ -504,9 +504,9 @@ def wrong(strains: Floats, name: str) -> Floats:
 def test_a_mistake_of_the_measurement_is_named(name: str, words: str, given: bool) -> None:
     strains, noise = scatter(struck_on_a_point()[1], NOISE, seed=1)
     options: dict[str, object] = {"noise": noise} if given else {}
-    found = located(wrong(strains, name), region=NEARER, grid=12.0, **options)
-    assert not found.accepted
-    (cause,) = [note for note in found.notes if "times better" in note]
+    location = located(wrong(strains, name), region=NEARER, grid=12.0, **options)
+    assert not location.accepted
+    (cause,) = [note for note in location.notes if "times better" in note]
     assert words in cause
 
 
@@ -516,7 +516,7 @@ def test_a_gain_of_1_3_that_the_noise_nearly_hides_is_named_with_its_gage(gage: 
     # A gain of one gage explains a part of what the gain of another one does.
     early = slice(0, 200)
     gains = np.where(np.arange(1, 5) == gage, 1.3, 1.0)
-    found = fecm.locate(
+    location = fecm.locate(
         public_panel(30, 20),
         (PUBLIC[early, 0], PUBLIC[early, 6:10] * gains),
         noise=3.7e-6,
@@ -524,18 +524,18 @@ def test_a_gain_of_1_3_that_the_noise_nearly_hides_is_named_with_its_gage(gage: 
         grid=25.0,
         mesh_error=False,
     )
-    assert not found.accepted
-    (cause,) = [note for note in found.notes if "times better" in note]
+    assert not location.accepted
+    (cause,) = [note for note in location.notes if "times better" in note]
     words = rf"gage {gage}, divided by 1\.(29|3|30|31), explains the strains 1\.[3-6] times better"
     assert re.match(words, cause), cause
 
 
 def test_right_strains_have_no_likely_mistake_and_are_accepted() -> None:
     strains, noise = scatter(struck_on_a_point()[1], NOISE, seed=1)
-    found = located(strains, noise=noise, region=NEAR, grid=12.0)
-    assert found.accepted
-    assert not any("times better" in note for note in found.notes)
-    assert found.misfit < 1.0 + 3.0 / np.sqrt(2.0 * strains.size) + 0.05
+    location = located(strains, noise=noise, region=NEAR, grid=12.0)
+    assert location.accepted
+    assert not any("times better" in note for note in location.notes)
+    assert location.misfit < 1.0 + 3.0 / np.sqrt(2.0 * strains.size) + 0.05
 
 
 @pytest.mark.long
@@ -543,9 +543,9 @@ def test_strains_of_a_late_trigger_are_named_as_late() -> None:
     late = 10  # points
     strains, _ = scatter(struck_on_a_point()[1], NOISE, seed=2)
     table = TIME[late:] - TIME[late - 1], strains[late:]
-    found = fecm.locate(struck_on_a_point()[0], table, region=CLOSE, grid=20.0)
-    assert not found.accepted
-    (cause,) = [note for note in found.notes if "times better" in note]
+    location = fecm.locate(struck_on_a_point()[0], table, region=CLOSE, grid=20.0)
+    assert not location.accepted
+    (cause,) = [note for note in location.notes if "times better" in note]
     assert "before the record explains the strains" in cause
     assert "--shift" in cause
 
@@ -571,16 +571,16 @@ def test_a_misfit_that_noise_does_not_explain_is_said_and_widens_the_errors() ->
 def test_strains_at_which_plies_fail_are_not_accepted() -> None:
     strains = struck_on_a_point()[1]
     with pytest.warns(fecm.FecmWarning, match="the largest strain is 2 %"):
-        found = located(strains * (0.02 / np.abs(strains).max()))
-    assert not found.accepted
-    assert any("the largest strain is 2 %, at which plies fail" in note for note in found.notes)
+        location = located(strains * (0.02 / np.abs(strains).max()))
+    assert not location.accepted
+    assert any("the largest strain is 2 %, at which plies fail" in note for note in location.notes)
 
 
 @pytest.mark.long
 def test_a_place_outside_the_region_is_doubted() -> None:
-    found = located(struck_on_a_point()[1], region=(20.0, 30.0, 50.0, 60.0), grid=15.0)
-    assert not found.accepted
-    assert any("edge of the region" in note for note in found.notes)
+    location = located(struck_on_a_point()[1], region=(20.0, 30.0, 50.0, 60.0), grid=15.0)
+    assert not location.accepted
+    assert any("edge of the region" in note for note in location.notes)
 
 
 def test_a_second_place_that_fits_almost_as_well_is_named() -> None:
@@ -589,12 +589,12 @@ def test_a_second_place_that_fits_almost_as_well_is_named() -> None:
     deck = with_gages(panel("[0/90]2s", (61.0, 58.0), SMALL), *beside)
     measured, noise = scatter(at_times(fecm.run_one(deck)), 5.0 * NOISE, seed=0)
     bare = without(deck, model.Patch)
-    found = fecm.locate(bare, (TIME, measured), region=(45, 10, 75, 70), grid=9.0, noise=noise)
-    assert found.second is not None
-    assert 1.0 <= found.second.ratio < 1.1
-    assert abs(found.second.y + found.y - 80.0) < 5.0  # a mirror place
-    assert not found.accepted
-    assert any("almost as well" in note for note in found.notes)
+    location = fecm.locate(bare, (TIME, measured), region=(45, 10, 75, 70), grid=9.0, noise=noise)
+    assert location.second is not None
+    assert 1.0 <= location.second.ratio < 1.1
+    assert abs(location.second.y + location.y - 80.0) < 5.0  # a mirror place
+    assert not location.accepted
+    assert any("almost as well" in note for note in location.notes)
 
 
 def test_gages_on_an_axis_of_symmetry_are_refused_with_both_places() -> None:
@@ -619,8 +619,8 @@ def test_gages_that_tell_the_sides_apart_are_accepted(
     layup: str, places: list[tuple[float, float, float, float]]
 ) -> None:
     deck = with_gages(without(panel(layup), model.Patch), *places)
-    found = fecm.locate(deck, (TIME, struck()[1][:, :2]), region=CLOSE, grid=20.0)
-    assert len(found.gages) == 2
+    location = fecm.locate(deck, (TIME, struck()[1][:, :2]), region=CLOSE, grid=20.0)
+    assert len(location.gages) == 2
 
 
 def test_a_twisted_panel_or_a_shear_preload_tells_the_sides_apart() -> None:

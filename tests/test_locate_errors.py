@@ -72,11 +72,11 @@ def independent(force: Floats, sd: float) -> Errors:
 def test_a_weak_force_whose_impulse_is_above_its_noise_belongs_to_the_contact(tail: int) -> None:
     # Every value of the tail is below three standard deviations; their sum is not.
     force = np.concatenate([np.full(12, 10.0), np.full(tail, 2.0), np.zeros(40)])
-    found = judged_force(np.arange(1.0, len(force) + 1.0), force, independent(force, 1.0), 1.0)
-    assert found.end is not None
+    judged = judged_force(np.arange(1.0, len(force) + 1.0), force, independent(force, 1.0), 1.0)
+    assert judged.end is not None
     # The sum of the last hats is below its noise again.
-    assert 13.0 + tail - 2.0 <= found.end <= 13.0 + tail
-    assert found.impulse == pytest.approx(force.sum(), abs=4.0)
+    assert 13.0 + tail - 2.0 <= judged.end <= 13.0 + tail
+    assert judged.impulse == pytest.approx(force.sum(), abs=4.0)
 
 
 def test_a_contact_whose_end_the_record_does_not_show_is_open() -> None:
@@ -85,14 +85,14 @@ def test_a_contact_whose_end_the_record_does_not_show_is_open() -> None:
     time = np.arange(1.0, len(force) + 1.0)
     assert judged_force(time, force, independent(force, 1.0), 1.0).end is None
     longer = np.append(force, [0.0, 0.0])
-    found = judged_force(np.append(time, [40.0, 41.0]), longer, independent(longer, 1.0), 1.0)
-    assert found.end == 31.0
-    assert found.impulse_sd == pytest.approx(np.sqrt(30.0))
+    judged = judged_force(np.append(time, [40.0, 41.0]), longer, independent(longer, 1.0), 1.0)
+    assert judged.end == 31.0
+    assert judged.impulse_sd == pytest.approx(np.sqrt(30.0))
 
 
 def test_the_largest_of_equal_forces_is_too_high_by_the_mean_of_their_largest_error() -> None:
     # The mean of the largest of five independent normal errors is 1.1630 standard deviations.
     force = np.full(5, 100.0)
-    found = judged_force(np.arange(5.0), force, independent(force, 2.0), 1.0)
-    assert found.peak_bias == pytest.approx(2.0 * 1.1630, rel=0.03)
-    assert found.peak_sd == 2.0
+    judged = judged_force(np.arange(5.0), force, independent(force, 2.0), 1.0)
+    assert judged.peak_bias == pytest.approx(2.0 * 1.1630, rel=0.03)
+    assert judged.peak_sd == 2.0

@@ -53,10 +53,10 @@ def closed(schema: Any) -> Any:
         return [closed(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    found = {key: closed(value) for key, value in schema.items()}
+    by_name = {key: closed(value) for key, value in schema.items()}
     if schema.get("type") == "object" and "properties" in schema:
-        found.setdefault("additionalProperties", False)
-    return found
+        by_name.setdefault("additionalProperties", False)
+    return by_name
 
 
 def validate(name: str, *outputs: str) -> None:

@@ -170,7 +170,7 @@ def test_a_time_step_is_written_as_a_person_reads_it() -> None:
 
 
 def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
-    made = call(
+    answer = call(
         "new",
         "-",
         "--size",
@@ -198,9 +198,9 @@ def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
         "--dt",
         "2.5e-7",
     )
-    assert made.exit_code == 0, made.stderr
-    assert "\nDT,,2.5E-7\n" in made.stdout
-    assert Macro("DT", value=2.5e-7) in fecm.read_one(made.stdout).macros
+    assert answer.exit_code == 0, answer.stderr
+    assert "\nDT,,2.5E-7\n" in answer.stdout
+    assert Macro("DT", value=2.5e-7) in fecm.read_one(answer.stdout).macros
 
 
 # Cards written and read again --------------------------------------------------------------------
@@ -254,9 +254,9 @@ STRENGTHS = replace(
 )
 def test_a_segment_is_written_with_all_that_it_says(segment: Segment) -> None:
     deck = fecm.read_one(small())
-    made = replace(deck, segments=(*deck.segments, segment), text="")
-    assert fecm.read_one(made.to_text()) == made
-    assert fecm.read_one(format_deck(made.to_text())) == made
+    changed = replace(deck, segments=(*deck.segments, segment), text="")
+    assert fecm.read_one(changed.to_text()) == changed
+    assert fecm.read_one(format_deck(changed.to_text())) == changed
 
 
 @pytest.mark.parametrize("card", ["", "hert", "DISC,,1.,2.", ",.3", ",,,,5.", " " * 49 + "5"])

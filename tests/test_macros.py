@@ -192,22 +192,24 @@ def test_modes_are_orthonormal_in_the_mass() -> None:
     problem = load_deck(MODES).problems[0]
     plate = build_plate(problem.deck, problem.mesh)
     for consistent in (False, True):
-        found = modes(plate, 6, consistent=consistent)
+        eigenmodes = modes(plate, 6, consistent=consistent)
         M = plate.consistent_mass.toarray() if consistent else np.diag(plate.mass)
-        np.testing.assert_allclose(found.shapes @ M @ found.shapes.T, np.eye(6), atol=1e-8)
-        K = found.shapes @ (plate.stiffness @ found.shapes.T)
-        np.testing.assert_allclose(K, np.diag(found.angular_frequency**2), atol=1e-7 * K.max())
+        np.testing.assert_allclose(
+            eigenmodes.shapes @ M @ eigenmodes.shapes.T, np.eye(6), atol=1e-8
+        )
+        K = eigenmodes.shapes @ (plate.stiffness @ eigenmodes.shapes.T)
+        np.testing.assert_allclose(K, np.diag(eigenmodes.angular_frequency**2), atol=1e-7 * K.max())
 
 
 def test_a_pulse_gives_the_response_that_the_modes_give() -> None:
     result = run(PULSE)
     problem = load_deck(PULSE).problems[0]
     plate = build_plate(problem.deck, problem.mesh)
-    found = modes(plate, plate.neq, consistent=False)
+    eigenmodes = modes(plate, plate.neq, consistent=False)
     row = int(problem.mesh.equations[40, 2]) - 1
-    participation = found.shapes[:, row]
+    participation = eigenmodes.shapes[:, row]
     # Each mode answers sin(p t) on 0 < t < 2, then swings freely: Duhamel's integral.
-    p, omega = np.pi / 2.0, found.angular_frequency
+    p, omega = np.pi / 2.0, eigenmodes.angular_frequency
 
     def answer(t: float) -> float:
         end = min(t, 2.0)

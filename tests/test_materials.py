@@ -29,9 +29,9 @@ def new(*options: str | Path) -> Done:
 
 
 def deck_of(*options: str | Path) -> Deck:
-    made = new(*options)
-    assert made.exit_code == 0, made.stderr
-    return fecm.read_one(made.stdout)
+    answer = new(*options)
+    assert answer.exit_code == 0, answer.stderr
+    return fecm.read_one(answer.stdout)
 
 
 # Soden, Hinton and Kaddour 1998, tables 1 and 2; Camanho, Maimi and Davila 2007, tables 2 and 3.
@@ -90,9 +90,9 @@ def test_damage_adds_strengths_and_toughness_in_the_decks_units(units: str) -> N
 
 
 def test_what_a_ply_lacks_is_told_or_refused() -> None:
-    made = new("--material", "IM7/8551-7", "--damage")
-    assert "note: IM7/8551-7 has no GIIc, so no delamination threshold (DELA)" in made.stderr
-    deck = fecm.read_one(made.stdout)
+    answer = new("--material", "IM7/8551-7", "--damage")
+    assert "note: IM7/8551-7 has no GIIc, so no delamination threshold (DELA)" in answer.stderr
+    deck = fecm.read_one(answer.stdout)
     assert deck.require(Allowables).s23 == 57.0
     assert not deck.has(Delamination)
     for refused in (
@@ -106,8 +106,8 @@ def test_what_a_ply_lacks_is_told_or_refused() -> None:
 def test_a_users_file_is_used_and_listed(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text('units = "m-N-s"\n' + OWN.replace("1.6e-9", "1600").replace("e3", "e9"))
-    made = new("--material", "mine", "--materials", file, "--units", "mm-N-s")
-    (problem,) = load_deck(made.stdout).problems
+    answer = new("--material", "mine", "--materials", file, "--units", "mm-N-s")
+    (problem,) = load_deck(answer.stdout).problems
     assert problem.laminate.A[0, 0] == pytest.approx(0.5 * (140e3 + 9e3) / 2 / (1 - 0.09 * 9 / 140))
     listed = call("materials", file)
     assert "mine (m-N-s)" in listed.stdout
@@ -145,10 +145,10 @@ def test_a_file_that_cannot_be_meant_is_refused_with_the_place(
 
 def test_the_plies_are_listed_for_programs_as_python_has_them(tmp_path: Path) -> None:
     lines = call("materials", "--units", "mm-ms-kg", "--format", "json").stdout.splitlines()
-    found = {row["name"]: row for row in map(json.loads, lines)}
-    assert found.keys() == fecm.materials().keys()
+    by_name = {row["name"]: row for row in map(json.loads, lines)}
+    assert by_name.keys() == fecm.materials().keys()
     # Camanho, Maimi and Davila 2007, in GPa and kN/mm.
-    ply = found["IM7/8552"]
+    ply = by_name["IM7/8552"]
     assert (ply["units"], ply["E1"], ply["XC"], ply["GIIc"]) == (
         "mm-kN-ms",
         171.42,
@@ -241,7 +241,7 @@ def test_a_system_that_is_not_consistent_is_refused_with_the_reason(given: str, 
 
 @pytest.mark.long
 def test_an_impact_in_the_units_of_an_explicit_code_is_that_in_millimetres_and_newtons() -> None:
-    made = {
+    by_name = {
         units: fecm.impact(
             fecm.Plate.rectangle((60, 40), (4, 4), support="simple"),
             fecm.Laminate("[0/90]s", "IM7/8552", 0.25),
@@ -254,11 +254,11 @@ def test_an_impact_in_the_units_of_an_explicit_code_is_that_in_millimetres_and_n
         )
         for units, mass, dt in (("mm-N-s", 1e-4, 2e-7), ("kg-mm-ms", 0.1, 2e-4))
     }
-    one, other = (fecm.run_one(deck) for deck in made.values())
+    one, other = (fecm.run_one(deck) for deck in by_name.values())
     # Fields of cards have six digits.
     np.testing.assert_allclose(other.force * 1e3, one.force, rtol=2e-5)
     np.testing.assert_allclose(other.time / 1e3, one.time, rtol=1e-12)
-    assert made["kg-mm-ms"].to_text().count("mm kN ms") == 1
+    assert by_name["kg-mm-ms"].to_text().count("mm kN ms") == 1
 
 
 @pytest.mark.parametrize(

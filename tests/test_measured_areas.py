@@ -61,8 +61,8 @@ def test_all_thresholds_of_the_page_are_tested() -> None:
 def test_the_formula_of_the_area_gives_the_number_of_delaminations_of_the_page() -> None:
     # [45/0/-45/90]3s at 15.47 J: E_d = 4.67 J of the page, G_IIc of the ply, area of the data.
     toughness = fecm.materials()["T800S/M21"].constants("mm-N-s")["GIIc"]
-    found = (15.47 - 4.67) * 1e3 / (2.0 * toughness * 534.3)
-    assert f"{found:.1f} at 15.47 J" in PAGE
+    value = (15.47 - 4.67) * 1e3 / (2.0 * toughness * 534.3)
+    assert f"{value:.1f} at 15.47 J" in PAGE
 
 
 def test_the_threshold_of_bvid_fe_is_that_of_dela_over_the_root_of_twelve() -> None:

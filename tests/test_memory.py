@@ -397,9 +397,9 @@ def test_many_small_problems_with_large_counts_are_refused() -> None:
     one = "FECM x\n999999999,1,1,2,5,4\nEND\nMACR\nEND\n".replace("999999999", "900000")
     prepared = load_deck(one * 50 + "STOP\n")
     assert len(prepared.problems) == 1
-    told = [f.message for f in prepared.findings if "together" in f.message]
-    assert len(told) == 49
-    assert told[0] == (
+    values = [f.message for f in prepared.findings if "together" in f.message]
+    assert len(values) == 49
+    assert values[0] == (
         "The file's problems have together NUMNP 1800000; at most 1000000 is allowed."
     )
 

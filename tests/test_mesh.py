@@ -83,14 +83,14 @@ def test_elements_between_two_cards_step_by_the_earlier_cards_increment() -> Non
     cards = Elements(
         (ElementNodes(1, (1, 2, 5, 4), 10), ElementNodes(3, (2, 3, 6, 5), 1)),
     )
-    made = mesh(cards, numnp=40).elements
-    assert made.tolist() == [[1, 2, 5, 4], [11, 12, 15, 14], [2, 3, 6, 5], [3, 4, 7, 6]]
+    elements = mesh(cards, numnp=40).elements
+    assert elements.tolist() == [[1, 2, 5, 4], [11, 12, 15, 14], [2, 3, 6, 5], [3, 4, 7, 6]]
 
 
 def test_a_blank_increment_of_elements_is_one_and_absent_nodes_stay_absent() -> None:
     cards = Elements((ElementNodes(1, (1, 2, 5, 4, 0, 7), 0),))
-    made = mesh(cards, numnp=40, numel=3, nen=6).elements
-    assert made.tolist() == [[1, 2, 5, 4, 0, 7], [2, 3, 6, 5, 0, 8], [3, 4, 7, 6, 0, 9]]
+    elements = mesh(cards, numnp=40, numel=3, nen=6).elements
+    assert elements.tolist() == [[1, 2, 5, 4, 0, 7], [2, 3, 6, 5, 0, 8], [3, 4, 7, 6, 0, 9]]
 
 
 def test_negative_codes_carry_on_through_generated_nodes_and_positive_ones_do_not() -> None:

@@ -17,7 +17,7 @@ STEPS = PROGRAM.replace("LOOP         10", "LOOP        150")
 
 def new(mesh: str, *options: str) -> str:
     """Deck of a plate that a bending wave of the impact covers."""
-    made = call(
+    answer = call(
         "new",
         "-",
         "--size",
@@ -42,8 +42,8 @@ def new(mesh: str, *options: str) -> str:
         "5e-5",
         *options,
     )
-    assert made.exit_code == 0, made.stderr
-    return made.stdout
+    assert answer.exit_code == 0, answer.stderr
+    return answer.stdout
 
 
 def peak(deck: str) -> float:
@@ -61,16 +61,16 @@ def test_the_second_peak_is_that_of_the_plate_with_elements_of_half_the_side(
     deck = tmp_path / "plate.inp"
     deck.write_text(new("4x4", *options))
     done = call("check", deck, "--mesh-error", "--format", "json")
-    found = json.loads(done.stdout.splitlines()[-1])
+    document = json.loads(done.stdout.splitlines()[-1])
     coarse, fine = peak(new("4x4", *options)), peak(new("8x8", *options))
-    assert (found["elements"], found["refined_elements"]) == (16, 64)
-    assert found["peak_force"] == pytest.approx(coarse, rel=1e-9)
-    assert found["refined_peak_force"] == pytest.approx(fine, rel=1e-9)
-    assert found["relative_change"] == pytest.approx(fine / coarse - 1.0, rel=1e-6)
-    assert found["undecided"]  # as the force still rises at the end
+    assert (document["elements"], document["refined_elements"]) == (16, 64)
+    assert document["peak_force"] == pytest.approx(coarse, rel=1e-9)
+    assert document["refined_peak_force"] == pytest.approx(fine, rel=1e-9)
+    assert document["relative_change"] == pytest.approx(fine / coarse - 1.0, rel=1e-6)
+    assert document["undecided"]  # as the force still rises at the end
     in_python = fecm.mesh_error(deck)
-    assert in_python.refined_peak_force == found["refined_peak_force"]
-    assert in_python.relative_change == found["relative_change"]
+    assert in_python.refined_peak_force == document["refined_peak_force"]
+    assert in_python.relative_change == document["relative_change"]
     if "hertz" not in options:
         return
     text = call("check", deck, "--mesh-error").stdout

@@ -29,13 +29,13 @@ def deck(segments: str = RIGID, *, steps: int = 330) -> str:
 
 def test_a_rigid_mass_rebounds_with_the_impulse_and_its_energy_is_absorbed() -> None:
     result = fecm.run_one(deck())
-    found = result.metrics
-    assert found["rebound_velocity"] == pytest.approx(result.velocity[-1], rel=1e-9)
-    assert found["impulse"] == pytest.approx(MASS * (SPEED + result.velocity[-1]), rel=1e-9)
+    metrics = result.metrics
+    assert metrics["rebound_velocity"] == pytest.approx(result.velocity[-1], rel=1e-9)
+    assert metrics["impulse"] == pytest.approx(MASS * (SPEED + result.velocity[-1]), rel=1e-9)
     absorbed = 0.5 * MASS * (SPEED**2 - result.velocity[-1] ** 2)
-    assert found["energy_absorbed"] == pytest.approx(absorbed, rel=1e-9)
-    assert found["max_deflection"] == result.plate_w.max()
-    assert found["peak_force"] == result.force.max()
+    assert metrics["energy_absorbed"] == pytest.approx(absorbed, rel=1e-9)
+    assert metrics["max_deflection"] == result.plate_w.max()
+    assert metrics["peak_force"] == result.force.max()
 
 
 def test_the_area_of_the_force_displacement_curve_is_the_absorbed_energy() -> None:
@@ -61,8 +61,8 @@ def test_run_info_and_sweep_have_the_same_metrics(tmp_path: Path) -> None:
     assert done.exit_code == 0
     said = json.loads(done.stdout)
     assert (said["result"], said["still_in_contact"]) == ("d.h5", False)
-    told = json.loads(call("info", "d.h5", "--format", "json", cwd=tmp_path).stdout)
-    assert said["metrics"] == told["metrics"]
+    document = json.loads(call("info", "d.h5", "--format", "json", cwd=tmp_path).stdout)
+    assert said["metrics"] == document["metrics"]
     assert list(said["metrics"]) == list(METRICS)
     swept = fecm.sweep(tmp_path / "d.inp", {"velocity": [SPEED]})
     for name in (*SUMMARY, *THRESHOLD):
@@ -71,12 +71,12 @@ def test_run_info_and_sweep_have_the_same_metrics(tmp_path: Path) -> None:
 
 def test_metrics_of_the_threshold_are_those_of_its_group(tmp_path: Path) -> None:
     result = fecm.run_one(deck(f"{RIGID}DELA\n.001,\n"))
-    found = result.metrics
+    metrics = result.metrics
     for name in ("force", "time", "margin"):
-        assert found[f"threshold_{name}"] == pytest.approx(result.threshold[name], rel=1e-12)
+        assert metrics[f"threshold_{name}"] == pytest.approx(result.threshold[name], rel=1e-12)
     above = result.force >= result.threshold["force"]
-    assert found["time_above"] == pytest.approx(0.5e-6 * np.count_nonzero(above), rel=1e-9)
-    assert found["threshold_margin"] == pytest.approx(
+    assert metrics["time_above"] == pytest.approx(0.5e-6 * np.count_nonzero(above), rel=1e-9)
+    assert metrics["threshold_margin"] == pytest.approx(
         1.0 - result.force.max() / result.threshold["force"], rel=1e-12
     )
     missed = fecm.run_one(deck(f"{RIGID}DELA\n10.,\n"))
@@ -91,8 +91,8 @@ def test_metrics_of_the_threshold_are_those_of_its_group(tmp_path: Path) -> None
 def test_a_contact_that_lasts_to_the_end_has_no_rebound(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(deck(steps=20))
     done = call("run", "d.inp", "--format", "json", cwd=tmp_path)
-    found = json.loads(done.stdout)["metrics"]
-    assert found["rebound_velocity"] == found["impulse"] == found["contact_time"] == "NaN"
+    metrics = json.loads(done.stdout)["metrics"]
+    assert metrics["rebound_velocity"] == metrics["impulse"] == metrics["contact_time"] == "NaN"
     assert "rebound" not in call("info", "d.h5", cwd=tmp_path).stdout
 
 

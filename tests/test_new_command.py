@@ -34,11 +34,11 @@ def held_in_plane(*options: str) -> dict[str, list[bool]]:
     places = {
         "left": (0, 40), "right": (100, 40), "bottom": (50, 0), "top": (50, 80), "inside": (50, 40)
     }  # fmt: skip
-    found = {}
+    by_name = {}
     for name, place in places.items():
         node = np.hypot(*(mesh.coordinates - place).T).argmin()
-        found[name] = (mesh.equations[node, :2] == 0).tolist()
-    return found
+        by_name[name] = (mesh.equations[node, :2] == 0).tolist()
+    return by_name
 
 
 # Energy and velocity -----------------------------------------------------------------------------
@@ -58,19 +58,19 @@ def held_in_plane(*options: str) -> dict[str, list[bool]]:
 )
 @pytest.mark.few(3)  # of 7, 0.05 s each
 def test_energy_and_velocity_take_a_unit(options: tuple[str, ...], velocity: float) -> None:
-    made = new(*PLATE, "--layup", "[0/90]4s", *QUICK, *options)
-    deck = fecm.read_one(made.stdout)
+    answer = new(*PLATE, "--layup", "[0/90]4s", *QUICK, *options)
+    deck = fecm.read_one(answer.stdout)
     assert deck.require(Impact).velocity == pytest.approx(velocity, rel=1e-6)
     joules = 0.5 * (velocity / 1e3) ** 2  # of 1 kg
-    assert f"note: energy {joules:.4g} J, {velocity:g} mm/s" in made.stderr
+    assert f"note: energy {joules:.4g} J, {velocity:g} mm/s" in answer.stderr
 
 
 def test_plies_thickness_and_stress_of_a_preload_are_said() -> None:
     # A layup that is symmetric and gets an s again has twice the plies.
-    made = new(*PLATE, "--layup", "[0/90/90/0]2s", *QUICK, "--velocity", "3", "--preload", "8,0")
-    h = fecm.read_one(made.stdout).require(Material).integration.thickness
-    assert f"the laminate [0/90/90/0]2s has 16 plies and is {h:.4g} mm thick" in made.stderr
-    assert f"the preload 8 N/mm is a mean stress of {8.0 / h:.4g} N/mm^2" in made.stderr
+    answer = new(*PLATE, "--layup", "[0/90/90/0]2s", *QUICK, "--velocity", "3", "--preload", "8,0")
+    h = fecm.read_one(answer.stdout).require(Material).integration.thickness
+    assert f"the laminate [0/90/90/0]2s has 16 plies and is {h:.4g} mm thick" in answer.stderr
+    assert f"the preload 8 N/mm is a mean stress of {8.0 / h:.4g} N/mm^2" in answer.stderr
 
 
 def test_a_duration_takes_a_unit() -> None:
@@ -91,14 +91,14 @@ def test_a_duration_takes_a_unit() -> None:
     ],
 )
 def test_units_that_cannot_be_meant_are_refused(option: str, value: str, message: str) -> None:
-    made = new(*PLATE, "--layup", "[0/90]4s", *QUICK, option, value)
-    assert_unusable(made)
-    assert message in made.stderr
+    answer = new(*PLATE, "--layup", "[0/90]4s", *QUICK, option, value)
+    assert_unusable(answer)
+    assert message in answer.stderr
 
 
 def test_a_unit_needs_the_decks_own() -> None:
     ply = ("--ply", "1.58e-9,.32,161000,11380,5170,5170,3980", "--ply-thickness", "0.125")
-    made = new(
+    answer = new(
         *ply,
         *PLATE[2:],
         "--layup",
@@ -107,16 +107,16 @@ def test_a_unit_needs_the_decks_own() -> None:
         "--energy",
         "4J",
     )
-    assert_unusable(made)
-    assert "--energy is '4J': give the deck's --units" in made.stderr
+    assert_unusable(answer)
+    assert "--energy is '4J': give the deck's --units" in answer.stderr
 
 
 def test_a_fixtures_energy_in_millijoules_is_doubted() -> None:
     doubt = "where D7136 has 6.7: --energy is in mJ unless it has a unit"
-    made = new(*D7136, *QUICK, "--energy", "10")
-    assert made.exit_code == 0
-    assert "note: the energy is 0.01 J, 0.0024 J per mm of thickness, " + doubt in made.stderr
-    assert "note: energy 0.01 J (0.00239 J per mm of thickness), 60.3 mm/s" in made.stderr
+    answer = new(*D7136, *QUICK, "--energy", "10")
+    assert answer.exit_code == 0
+    assert "note: the energy is 0.01 J, 0.0024 J per mm of thickness, " + doubt in answer.stderr
+    assert "note: energy 0.01 J (0.00239 J per mm of thickness), 60.3 mm/s" in answer.stderr
     assert doubt not in new(*D7136, *QUICK, "--energy", "10J").stderr
     plate = fecm.Plate.on_fixture("D7136", (8, 6))
     laminate = fecm.Laminate("[45/0/-45/90]4s", "IM7/8552")
@@ -202,9 +202,9 @@ def test_a_core_that_is_thinner_than_a_ply_is_doubted() -> None:
     ids=["no support", "no s", "duration in ms", "diameter", "modulus in GPa", "10 kJ", "rim"],
 )  # fmt: skip
 def test_a_likely_mistake_of_an_option_is_named(options: tuple[str, ...], message: str) -> None:
-    made = new(*options)
-    assert made.exit_code == 0
-    assert message in made.stderr
+    answer = new(*options)
+    assert answer.exit_code == 0
+    assert message in answer.stderr
 
 
 def test_sound_options_are_not_doubted() -> None:
@@ -233,9 +233,9 @@ def test_sound_options_are_not_doubted() -> None:
 def test_a_mistake_that_gives_no_deck_is_named_with_its_cause(
     options: tuple[str, ...], message: str
 ) -> None:
-    made = new(*options)
-    assert made.exit_code == 2
-    assert message in made.stderr
+    answer = new(*options)
+    assert answer.exit_code == 2
+    assert message in answer.stderr
 
 
 # Plies -------------------------------------------------------------------------------------------
@@ -244,9 +244,9 @@ def test_a_mistake_that_gives_no_deck_is_named_with_its_cause(
 def test_a_named_ply_has_its_own_thickness_in_the_decks_units() -> None:
     options = ("--size", "100x80", "--mesh", "5x4", "--layup", "[0/90]4s", "--velocity", "3000",
                "--law", "1e4,0,0,1.5", "--projectile", "mass:1e-3", *QUICK)  # fmt: skip
-    made = new(*options, "--material", "T300/5208", "--units", "mm-N-s")
-    assert "note: the plies are 0.125 mm thick, as T300/5208 is listed" in made.stderr
-    deck = fecm.read_one(made.stdout)
+    answer = new(*options, "--material", "T300/5208", "--units", "mm-N-s")
+    assert "note: the plies are 0.125 mm thick, as T300/5208 is listed" in answer.stderr
+    deck = fecm.read_one(answer.stdout)
     assert deck.require(Material).layers[0].thickness == 0.125
     (thinner,) = {
         layer.thickness
@@ -263,10 +263,10 @@ def test_a_named_ply_has_its_own_thickness_in_the_decks_units() -> None:
 
 
 def test_a_ply_thickness_in_another_unit_is_named_against_the_plates_side() -> None:
-    made = new(*D7136, *QUICK, "--ply-thickness", "125")
-    assert_unusable(made)
-    assert "32 plies of --ply-thickness 125 are 4000 thick" in made.stderr
-    assert "the plate's shorter side is 100" in made.stderr
+    answer = new(*D7136, *QUICK, "--ply-thickness", "125")
+    assert_unusable(answer)
+    assert "32 plies of --ply-thickness 125 are 4000 thick" in answer.stderr
+    assert "the plate's shorter side is 100" in answer.stderr
 
 
 @pytest.mark.long
@@ -278,8 +278,8 @@ def test_a_toughness_stands_in_for_one_that_a_ply_does_not_have() -> None:
     deck = new_deck(*D7136[:4], *D7136[6:], *ply, *QUICK, "--giic", "0.9")
     assert deck.require(Delamination) == Delamination(0.9)
     assert new_deck(*D7136, *QUICK, "--giic", "0.9").require(Delamination).toughness == 0.9
-    own = new_deck(*D7136, *QUICK, "--damage").require(Delamination).toughness
-    assert own == MATERIALS["IM7/8552"].value("GIIc", "mm-N-s")
+    toughness = new_deck(*D7136, *QUICK, "--damage").require(Delamination).toughness
+    assert toughness == MATERIALS["IM7/8552"].value("GIIc", "mm-N-s")
 
 
 STORED = (*D7136, "--damage", "--duration", "5e-6", "--dt", "1e-7")
@@ -346,9 +346,9 @@ def test_the_edges_of_a_plate_that_stretches_are_held_in_the_plane_as_asked(
 def test_an_imported_mesh_is_held_across_its_straight_edges_only() -> None:
     mesh = ("--mesh", str(DATA / "hole-quad8.msh"))
     options = (*MM, "--layup", "[0/90]", "--velocity", "1000", *QUICK, "--in-plane", "normal")
-    made = new(*mesh, *options, "--support", "simple")
-    assert made.exit_code == 2
-    assert "the sides of 'boundary' are not all along x or y" in made.stderr
+    answer = new(*mesh, *options, "--support", "simple")
+    assert answer.exit_code == 2
+    assert "the sides of 'boundary' are not all along x or y" in answer.stderr
 
 
 def test_a_laminate_without_coupling_stays_held_everywhere() -> None:
@@ -363,7 +363,7 @@ def test_a_coupled_laminate_slides_on_the_window_of_a_fixture() -> None:
     # N/mm on 20 x 12 elements, with u and v of the window's nodes restrained and freed by hand.
     for in_plane, expected in (("held", 3060.0), (None, 2199.0)):
         asked = () if in_plane is None else ("--in-plane", in_plane)
-        made = new(
+        answer = new(
             "--fixture",
             "D7136",
             "--mesh",
@@ -381,8 +381,8 @@ def test_a_coupled_laminate_slides_on_the_window_of_a_fixture() -> None:
             "--kinematics",
             "linear",
         )
-        assert ("! The plate slides on the window" in made.stdout) == (in_plane is None)
-        (problem,) = load_deck(made.stdout).problems
+        assert ("! The plate slides on the window" in answer.stdout) == (in_plane is None)
+        (problem,) = load_deck(answer.stdout).problems
         assert problem.contact is not None
         found = static_stiffness(problem.moving_plate, problem.contact)
         assert found == pytest.approx(expected, rel=0.015)
@@ -391,8 +391,8 @@ def test_a_coupled_laminate_slides_on_the_window_of_a_fixture() -> None:
 def test_as_many_dofs_are_pinned_as_rigid_motions_in_the_plane_are_free() -> None:
     counts = {"free": 3, "held": 0}
     for in_plane, count in counts.items():
-        made = new(*COUPLED, "--support", "simple", "--in-plane", in_plane, *QUICK)
-        (problem,) = load_deck(made.stdout).problems
+        answer = new(*COUPLED, "--support", "simple", "--in-plane", in_plane, *QUICK)
+        (problem,) = load_deck(answer.stdout).problems
         assert len(in_plane_pins(problem.plate)) == count
     one_edge = ("--edge", "left=simple", "--in-plane", "normal")
     (problem,) = load_deck(new(*COUPLED, *one_edge, *QUICK).stdout).problems
@@ -401,8 +401,8 @@ def test_as_many_dofs_are_pinned_as_rigid_motions_in_the_plane_are_free() -> Non
 
 
 def test_a_static_solution_pins_the_rigid_motion_in_the_plane_without_a_reaction() -> None:
-    made = new(*COUPLED, "--support", "simple", "--in-plane", "free", *QUICK)
-    (problem,) = load_deck(made.stdout).problems
+    answer = new(*COUPLED, "--support", "simple", "--in-plane", "free", *QUICK)
+    (problem,) = load_deck(answer.stdout).problems
     plate, contact = problem.plate, problem.contact
     assert contact is not None
     load = contact[plate.mesh.equations > 0]
@@ -445,9 +445,9 @@ def test_an_impact_whose_contact_cannot_be_estimated_gets_half_periods(
     options: tuple[str, ...],
 ) -> None:
     by_default = (*D7136[: -len(LAW)], "--kinematics", "linear")
-    made = new(*by_default, *options)
+    answer = new(*by_default, *options)
     plain = new_deck(*by_default)
-    deck = fecm.read_one(made.stdout)
+    deck = fecm.read_one(answer.stdout)
     time, expected = (
         {macro.word: macro.value for macro in one.macros}["LOOP"] for one in (deck, plain)
     )
@@ -580,8 +580,8 @@ def test_the_older_name_and_full_quadrature_decide_the_kinematics() -> None:
 def test_a_plate_that_stretches_is_run_for_the_shorter_contact_of_its_static_curve() -> None:
     times = []
     for kinematics in ("linear", "von-karman"):
-        made = new(*THIN, "--energy", "30J", "--kinematics", kinematics)
-        words = {macro.word: macro.value for macro in fecm.read_one(made.stdout).macros}
+        answer = new(*THIN, "--energy", "30J", "--kinematics", kinematics)
+        words = {macro.word: macro.value for macro in fecm.read_one(answer.stdout).macros}
         # Four times the expected passes, as OVER ends the loop.
         times.append(words["DT"] * words["LOOP"] / 4)
     assert times[0] == pytest.approx(12e-3, rel=0.01)
@@ -606,10 +606,10 @@ def test_a_title_names_plate_layup_ply_and_energy(options: tuple[str, ...], titl
     [("--projectile", "mass:5.5kg"), ("--contact", "estimate:8mm"), ("--ply-thickness", ".184 kg")],
 )
 def test_a_unit_where_a_number_is_needed_is_named(option: tuple[str, str]) -> None:
-    made = new(*D7136, *QUICK, *option)
-    assert_unusable(made)
+    answer = new(*D7136, *QUICK, *option)
+    assert_unusable(answer)
     number = option[1].partition(":")[2] or option[1]
-    assert f"{number!r} has a unit; give the number alone, in the deck's units" in made.stderr
+    assert f"{number!r} has a unit; give the number alone, in the deck's units" in answer.stderr
 
 
 @pytest.mark.parametrize("every", [(), ("--every", "7"), ("--every", "300")])

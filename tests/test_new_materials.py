@@ -52,9 +52,9 @@ def new(*options: str | Path) -> Done:
 
 
 def deck_of(*options: str | Path) -> Deck:
-    made = new(*LAW, *options)
-    assert made.exit_code == 0, made.stderr
-    return fecm.read_one(made.stdout)
+    answer = new(*LAW, *options)
+    assert answer.exit_code == 0, answer.stderr
+    return fecm.read_one(answer.stdout)
 
 
 def rows(deck: Deck, laminate: int = 1) -> list[tuple[float, float, int]]:
@@ -111,35 +111,35 @@ def test_a_zone_has_the_elements_whose_centres_lie_in_it() -> None:
 
 def test_zones_go_over_each_other_in_their_order() -> None:
     zones = ("--zone", "0,0,20,30:[0C]", "--zone", "0,0,10,30:[0C/90G]s", "--zone", "0,0,4,9:[0C]")
-    made = new(*LAW, *HYBRID, *zones[:4])
-    assert laminates(fecm.read_one(made.stdout)) == [1, 2, 1, 1] * 3
-    assert "cuts" not in made.stderr
+    answer = new(*LAW, *HYBRID, *zones[:4])
+    assert laminates(fecm.read_one(answer.stdout)) == [1, 2, 1, 1] * 3
+    assert "cuts" not in answer.stderr
     empty = new(*LAW, *HYBRID, *zones[4:])
     assert empty.exit_code == 2
     assert "--zone 0,0,4,9 has no element whose centre lies in it" in empty.stderr
 
 
 def test_a_zone_that_cuts_elements_is_told() -> None:
-    made = new(*LAW, *HYBRID, "--zone", "9,10,26,20:[0C/90G]2s")
-    assert "cuts 2 elements" in made.stderr
-    assert "reaches over 10, 10, 30, 20" in made.stderr
-    assert laminates(fecm.read_one(made.stdout)) == [1] * 5 + [2] * 2 + [1] * 5
+    answer = new(*LAW, *HYBRID, "--zone", "9,10,26,20:[0C/90G]2s")
+    assert "cuts 2 elements" in answer.stderr
+    assert "reaches over 10, 10, 30, 20" in answer.stderr
+    assert laminates(fecm.read_one(answer.stdout)) == [1] * 5 + [2] * 2 + [1] * 5
 
 
 def test_damage_has_strengths_of_every_material_and_the_least_toughness() -> None:
     deck = deck_of("--layup", "[0A/90B]s", "--material", "A=AS4/8552", "--material", "B=IM7/8552",
                    "--damage")  # fmt: skip
     strengths = deck.require(Allowables)
-    found = {one.material: one.xt for one in (strengths, *strengths.others)}
-    assert found == {1: 2207.0, 2: 2326.2}
+    by_name = {one.material: one.xt for one in (strengths, *strengths.others)}
+    assert by_name == {1: 2207.0, 2: 2326.2}
     assert deck.require(Delamination).toughness == 0.7879
 
 
 def test_materials_without_strengths_are_named() -> None:
-    made = new(*LAW, *SANDWICH[:6], "--core", "F:5", "--ply-of", "F=6e-11,.4,75,75,20,20,20",
+    answer = new(*LAW, *SANDWICH[:6], "--core", "F:5", "--ply-of", "F=6e-11,.4,75,75,20,20,20",
                "--units", "mm-N-s", "--damage", "--layup", "[0/F/0]")  # fmt: skip
-    assert made.exit_code == 0
-    assert "W498" in made.stderr
+    assert answer.exit_code == 0
+    assert "W498" in answer.stderr
 
 
 def test_cure_has_the_expansions_of_every_material() -> None:
@@ -180,10 +180,10 @@ def test_k_of_a_sandwich_is_doubted() -> None:
     ],
 )
 def test_mistakes_are_told(options: tuple[str, ...], message: str) -> None:
-    made = new(*LAW, *options)
-    assert made.exit_code == 2
-    assert message in " ".join(made.stderr.split())
-    assert "Traceback" not in made.stderr
+    answer = new(*LAW, *options)
+    assert answer.exit_code == 2
+    assert message in " ".join(answer.stderr.split())
+    assert "Traceback" not in answer.stderr
 
 
 def objects(laminate: fecm.Laminate, **options: object) -> Deck:
@@ -250,10 +250,10 @@ def test_physical_surfaces_of_gmsh_carry_laminates(tmp_path: Path) -> None:
     )  # fmt: skip
     file = tmp_path / "plate.msh"
     mesh.write(file, file_format="gmsh22")
-    made = call("new", "-", "--mesh", file, "--edge", "boundary=simple", *STRIKE, *LAW, *HYBRID,
+    answer = call("new", "-", "--mesh", file, "--edge", "boundary=simple", *STRIKE, *LAW, *HYBRID,
                 "--zone", "pad:[0C/90G]2s")  # fmt: skip
-    assert made.exit_code == 0, made.stderr
-    assert laminates(fecm.read_one(made.stdout)) == [1, 2, 1, 1, 2, 1]
+    assert answer.exit_code == 0, answer.stderr
+    assert laminates(fecm.read_one(answer.stdout)) == [1, 2, 1, 1, 2, 1]
 
 
 def test_a_sweep_over_materials_of_layers_is_that_of_single_runs() -> None:
@@ -292,8 +292,8 @@ def test_the_picture_of_failure_shows_plates_of_several_laminates(tmp_path: Path
     result = fecm.run_one(deck)
     assert np.isnan(result["failure/max_stress/exposure"]).any()
     result.save(tmp_path / "r.h5")
-    made = call("plot", tmp_path / "r.h5", "--kind", "failure", "-o", tmp_path / "r.png")
-    assert made.exit_code == 0, made.stderr
+    answer = call("plot", tmp_path / "r.h5", "--kind", "failure", "-o", tmp_path / "r.png")
+    assert answer.exit_code == 0, answer.stderr
     assert (tmp_path / "r.png").stat().st_size > 10_000
 
 
@@ -303,11 +303,11 @@ def test_a_sweep_over_the_cure_of_several_materials_is_that_of_single_runs() -> 
                    "--zone", "10,10,30,20:[0C/90G]2s")  # fmt: skip
     deck = deck.with_(mass=2e-7, duration=5e-5)
     changes = [-100.0, -50.0]
-    found = fecm.sweep(deck, {"cure_dT": changes}, measure="failure")
+    swept = fecm.sweep(deck, {"cure_dT": changes}, measure="failure")
     for row, change in enumerate(changes):
         single = fecm.run_one(deck.with_(cure_dT=change))
         for one in largest_exposures(single):
-            assert found[f"exposure_{one.criterion}"][row] == pytest.approx(one.exposure, rel=1e-9)
+            assert swept[f"exposure_{one.criterion}"][row] == pytest.approx(one.exposure, rel=1e-9)
 
 
 def test_an_interface_of_a_core_has_the_mode_of_the_core() -> None:
@@ -322,8 +322,8 @@ def test_an_interface_of_a_core_has_the_mode_of_the_core() -> None:
 
 def test_a_sandwich_has_no_delamination_threshold() -> None:
     options = (*SANDWICH, "--units", "mm-N-s", "--damage")
-    made = new(*LAW, *options)
-    assert "no delamination threshold (DELA): it holds for a solid laminate" in made.stderr
+    answer = new(*LAW, *options)
+    assert "no delamination threshold (DELA): it holds for a solid laminate" in answer.stderr
     deck = deck_of(*options)
     assert deck.last(Delamination) is None
     with_threshold = replace(deck, segments=(Delamination(0.3), *deck.segments), text="")
@@ -393,8 +393,8 @@ def test_summary_json_page_and_picture_name_the_metal_that_yields(tmp_path: Path
 def test_the_material_of_a_ply_is_that_of_the_laminate_where_it_is() -> None:
     deck = deck_of(*GLARE[:-1], "--layup", "[0G/0G/0G]", "--zone", "10,10,30,20:[0M/0G/0M]",
                    "--damage")  # fmt: skip
-    found = {one.criterion: one for one in largest_exposures(fecm.run_one(deck))}
-    one = found["max_stress"]
+    by_name = {one.criterion: one for one in largest_exposures(fecm.run_one(deck))}
+    one = by_name["max_stress"]
     is_inside = 10.0 < one.x < 30.0 and 10.0 < one.y < 20.0
     assert one.materials == (("2024-T3" if is_inside and one.ply != 2 else "E-glass/MY750"),)
 
@@ -444,7 +444,7 @@ def test_findings_of_stresses_at_rest_name_the_metal_that_yields(
     deck = deck_of(*GLARE)
     weak = replace(deck.require(Allowables), xt=1.0, xc=1.0, yt=1.0, yc=1.0, s12=0.58)
     segments = [weak if isinstance(one, Allowables) else one for one in deck.segments]
-    own = replace(deck, segments=(*segments, segment), text="")
-    (finding,) = [one for one in load_deck(own).findings if one.code == code]
+    changed = replace(deck, segments=(*segments, segment), text="")
+    (finding,) = [one for one in load_deck(changed).findings if one.code == code]
     assert "yield" in finding.message
     assert "(2024-T3)" in finding.message

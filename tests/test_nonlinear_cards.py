@@ -62,18 +62,18 @@ def with_codes(made: fecm.Deck, codes: np.ndarray[Any, Any]) -> fecm.Deck:
 
 def test_a_nonlinear_deck_of_new_has_no_findings_of_its_words() -> None:
     for in_plane in ("held", "normal", "free"):
-        found = findings(deck(in_plane=in_plane, preload=(5.0, 5.0)))
-        assert found.keys() <= {"W415"}  # its mesh is coarse
+        codes = findings(deck(in_plane=in_plane, preload=(5.0, 5.0)))
+        assert codes.keys() <= {"W415"}  # its mesh is coarse
 
 
 def test_a_plane_that_is_held_everywhere_is_an_error_at_the_card_of_nodes_inside() -> None:
     linear = fecm.impact(plate(), PLIES, MASS, LAW, kinematics="linear", **QUICK).to_text()
-    found = findings(linear.replace("EXPE\n", "NONL\nEXPE\n"))
-    assert found.keys() == {"E490"}
-    assert found["E490"].place is not None
-    codes = found["E490"].place.text.split()[2:]
+    deck_findings = findings(linear.replace("EXPE\n", "NONL\nEXPE\n"))
+    assert deck_findings.keys() == {"E490"}
+    assert deck_findings["E490"].place is not None
+    codes = deck_findings["E490"].place.text.split()[2:]
     assert codes == ["-1", "-1", "0", "0", "0"]
-    assert "fecm new --nonlinear --in-plane" in found["E490"].hint
+    assert "fecm new --nonlinear --in-plane" in deck_findings["E490"].hint
     # What the hint says, done on every card of such nodes.
     mended = linear.replace("   -1   -1    0    0    0\n", "    0    0    0    0    0\n")
     mended = mended.replace("    1    1    0    0    0\n", "    0    0    0    0    0\n")
@@ -124,13 +124,13 @@ def half(u: int) -> fecm.Deck:
 
     The other edges are clamped and free in the plane.
     """
-    made = deck(in_plane="free", plate=plate(right="free"))
-    mesh = generate(made)
+    text = deck(in_plane="free", plate=plate(right="free"))
+    mesh = generate(text)
     codes = mesh.codes.copy()
     line = mesh.coordinates[:, 0] == 100.0
     codes[line, 0] = u
     codes[line, 3] = 1
-    return with_codes(made, codes)
+    return with_codes(text, codes)
 
 
 def test_a_line_of_symmetry_that_may_move_across_itself_is_named() -> None:
@@ -151,16 +151,18 @@ def test_a_preload_beyond_one_per_cent_strain_is_doubted(
     forces: tuple[float, ...], share: float | None
 ) -> None:
     # E of [0/90]2s in tension is (E1 + E2)/2 but for contraction, its shear modulus G12.
-    found = findings(deck(preload=forces))
-    assert ("W484" in found) == (share is not None)
+    codes = findings(deck(preload=forces))
+    assert ("W484" in codes) == (share is not None)
     if share is not None:
-        said = float(found["W484"].message.split()[-1].rstrip("%."))
+        said = float(codes["W484"].message.split()[-1].rstrip("%."))
         assert said == pytest.approx(share, rel=0.03)
 
 
 def test_a_preload_bends_an_unsymmetric_laminate_unless_it_is_zero() -> None:
-    made = fecm.impact(plate(), fecm.Laminate("[0/90]", "IM7/8552", 0.184), MASS, LAW, **QUICK)
-    text = made.to_text()
+    impact_deck = fecm.impact(
+        plate(), fecm.Laminate("[0/90]", "IM7/8552", 0.184), MASS, LAW, **QUICK
+    )
+    text = impact_deck.to_text()
     loaded, empty = (findings(text.replace("EXPE\n", f"PREL\n{n},\nEXPE\n")) for n in ("1.", "0."))
     assert "E483" in loaded
     assert "E483" not in empty
@@ -178,13 +180,13 @@ def test_a_linear_deck_of_new_writes_none_of_the_words() -> None:
 
 
 def test_a_nonlinear_plate_lies_on_the_window_of_its_fixture() -> None:
-    made = fecm.impact(
+    impact_deck = fecm.impact(
         fecm.Plate.on_fixture("D7136", (6, 4)),
         fecm.Laminate("[45/0/-45/90]3s", "IM7/8552", 0.184),
         nonlinear=True,
         duration=1e-5,
     )
-    mesh = generate(made)
+    mesh = generate(impact_deck)
     assert not mesh.codes[:, :2].any()
     assert mesh.codes[:, 2].any()
 
@@ -196,16 +198,16 @@ def test_the_time_step_is_that_of_all_five_unknowns() -> None:
     narrow = fecm.Plate.rectangle((40, 400), (8, 4), support="clamped")
     steps = []
     for nonlinear in (False, True):
-        made = fecm.impact(narrow, plies, MASS, LAW, **QUICK | {"nonlinear": nonlinear})
-        (dt,) = (macro.value for macro in made.macros if macro.word == "DT")
-        critical = critical_time_step(build_plate(made, generate(made)))
+        impact_deck = fecm.impact(narrow, plies, MASS, LAW, **QUICK | {"nonlinear": nonlinear})
+        (dt,) = (macro.value for macro in impact_deck.macros if macro.word == "DT")
+        critical = critical_time_step(build_plate(impact_deck, generate(impact_deck)))
         assert 0.86 * critical < dt <= 0.9 * critical
         steps.append(dt)
     assert steps[1] < 0.8 * steps[0]
 
 
 def test_a_preload_takes_units_and_a_missing_shear_is_zero() -> None:
-    made = fecm.impact(
+    impact_deck = fecm.impact(
         fecm.Plate.rectangle((0.1, 0.08), (4, 4), support="clamped"),
         fecm.Laminate("[0/90]2s", "IM7/8552", 1.84e-4),
         fecm.RigidMass(1.0),
@@ -215,7 +217,7 @@ def test_a_preload_takes_units_and_a_missing_shear_is_zero() -> None:
         units="m-N-s",
         preload=("50N/mm", -20.0),
     )
-    assert made.require(Preload) == Preload(50e3, -20.0, 0.0)
+    assert impact_deck.require(Preload) == Preload(50e3, -20.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -225,7 +227,7 @@ def test_a_preload_takes_units_and_a_missing_shear_is_zero() -> None:
 def test_step_toughness_and_radii_take_units(
     dt: float | str, giic: float | str, radius: float | str
 ) -> None:
-    made = fecm.impact(
+    impact_deck = fecm.impact(
         fecm.Plate.rectangle((100, 80), (4, 4), support="simple"),
         fecm.Laminate("[0/90]2s", "IM7/8552", 0.184),
         fecm.RigidMass(1e-3),
@@ -238,10 +240,10 @@ def test_step_toughness_and_radii_take_units(
         radius_x=radius,
         radius_y=radius,
     )
-    assert made.require(Delamination).toughness == pytest.approx(0.8, rel=1e-8)
-    curvature = made.require(Curvature)
+    assert impact_deck.require(Delamination).toughness == pytest.approx(0.8, rel=1e-8)
+    curvature = impact_deck.require(Curvature)
     assert (curvature.radius_x, curvature.radius_y) == (1000.0, 1000.0)
-    assert next(m.value for m in made.macros if m.word == "DT") == 2e-7
+    assert next(m.value for m in impact_deck.macros if m.word == "DT") == 2e-7
 
 
 @pytest.mark.parametrize(
@@ -277,9 +279,9 @@ def test_a_mesh_of_a_generator_is_held_in_its_plane_as_asked() -> None:
     pytest.importorskip("meshio", reason="meshes are read by meshio")
     hole = fecm.Plate.from_mesh(DATA / "hole-quad8.msh", {"clamped": "clamped"})
     for in_plane, expected in (("held", True), ("free", False)):
-        made = deck(plate=hole, in_plane=in_plane, at=(15, 20))
-        codes = generate(made).codes != 0
-        assert made.require(Shear).assumed
+        text = deck(plate=hole, in_plane=in_plane, at=(15, 20))
+        codes = generate(text).codes != 0
+        assert text.require(Shear).assumed
         assert (codes[:, :2] == (codes[:, 2:3] & expected)).all()
 
 
@@ -306,14 +308,14 @@ def test_displaced_edges_before_an_impact_are_the_preload_of_their_strain() -> N
     (recipe,) = re.findall(r"```\n(FORC\n.*?END\n)```", page, re.DOTALL)
     displaced, newton = recipe.split("...\nMACR\n")
     newton = newton[: newton.index("LMAS")]
-    made = deck()
-    rigidity = load_deck(made).problems[0].laminate.A
+    text = deck()
+    rigidity = load_deck(text).problems[0].laminate.A
     forces = rigidity @ [0.0004, 0.0, 0.0]
-    loaded = made.to_text().replace("EXPE\n", f"{displaced}EXPE\n")
+    loaded = text.to_text().replace("EXPE\n", f"{displaced}EXPE\n")
     results = [
         fecm.run_one(loaded.replace("MACR\n", f"MACR\n{newton}")),
-        fecm.run_one(made.with_(preload_x=forces[0], preload_y=forces[1])),
-        fecm.run_one(made),
+        fecm.run_one(text.with_(preload_x=forces[0], preload_y=forces[1])),
+        fecm.run_one(text),
     ]
     by_hand, by_card, without = (result.force for result in results)
     peak = without.max()
@@ -333,18 +335,18 @@ def test_a_swept_preload_is_that_of_a_deck_changed_by_hand() -> None:
     assert again.require(Preload) == Preload(20.0, 7.0, -3.0)
     assert len(again.all(Preload)) == 1
 
-    found = fecm.sweep(fecm.read_one(text), {"preload_x": [0.0, 200.0]}, history=True)
-    assert found.force is not None
+    swept = fecm.sweep(fecm.read_one(text), {"preload_x": [0.0, 200.0]}, history=True)
+    assert swept.force is not None
     for case, force in enumerate((0.0, 200.0)):
         result = fecm.run_one(text.replace("EXPE\n", f"PREL\n{force},\nEXPE\n"))
-        steps = min(int(found.steps[case]), len(result.force))
-        difference = np.abs(found.force[case, :steps] - result.force[:steps]).max()
+        steps = min(int(swept.steps[case]), len(result.force))
+        difference = np.abs(swept.force[case, :steps] - result.force[:steps]).max()
         assert difference < 1e-9 * result.force.max()
 
 
 def test_a_support_of_a_nonlinear_plate_leaves_it_free_inside() -> None:
-    made = apply_case(deck(), {"support": "simple"})
-    assert (generate(made).codes[:, :2] == 0).all(axis=1).sum() == 49
+    changed = apply_case(deck(), {"support": "simple"})
+    assert (generate(changed).codes[:, :2] == 0).all(axis=1).sum() == 49
 
 
 def test_nonlinear_plates_share_no_impulse_response() -> None:

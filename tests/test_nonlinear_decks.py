@@ -79,8 +79,8 @@ def test_newtons_method_ends_in_equilibrium_with_the_supports() -> None:
 
 
 def test_a_plate_that_is_free_in_its_plane_needs_no_supports_there() -> None:
-    found = {name: result(NEWTON + "DISP\n", held=name, data=forces(2000.0)) for name in SUPPORTS}
-    free, held = found["free"].tape3, found["both"].tape3
+    by_name = {name: result(NEWTON + "DISP\n", held=name, data=forces(2000.0)) for name in SUPPORTS}
+    free, held = by_name["free"].tape3, by_name["both"].tape3
     assert free.w[0, 12] > 1.2 * held.w[0, 12]
     u = free.displacement[0, :, 0].reshape(5, 5)
     np.testing.assert_allclose(u[2, 0] - u[2, 4], 2.0 * (u[2, 0] - u[2, 2]), rtol=1e-6)

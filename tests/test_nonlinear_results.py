@@ -185,15 +185,15 @@ def test_a_gage_reads_the_linear_strain_and_half_the_square_of_the_slope(
         [0.1 * x * y, 0.2 * x**2, 0.3 * x**2 - 0.2 * x * y + y, 0.4 * x * y, 0.5 * y], axis=1
     )
     (x, y), z, direction = place, 0.05, 30.0
-    made = gages(plate.mesh, [model.Gage(1, x, y, z, direction)], nonlinear=True)
-    sums = (field.ravel()[made.dof_indices] * made.weights).sum(axis=1)
+    gage_cards = gages(plate.mesh, [model.Gage(1, x, y, z, direction)], nonlinear=True)
+    sums = (field.ravel()[gage_cards.dof_indices] * gage_cards.weights).sum(axis=1)
     s = np.array([np.cos(np.deg2rad(direction)), np.sin(np.deg2rad(direction))])
     in_plane = np.array([[0.1 * y, 0.1 * x], [0.4 * x, 0.0]])
     rotations = np.array([[0.4 * y, 0.4 * x], [0.0, 0.5]])
     slope = s @ [0.6 * x - 0.2 * y, -0.2 * x + 1.0]
     right = s @ (in_plane - z * rotations) @ s + slope**2 / 2.0
     assert slope**2 > 0.3
-    np.testing.assert_allclose(made.strains(sums), right, rtol=1e-12)
+    np.testing.assert_allclose(gage_cards.strains(sums), right, rtol=1e-12)
 
 
 # Runs --------------------------------------------------------------------------------------------
@@ -222,8 +222,8 @@ def static(case: str, deflection: str) -> tuple[dict[str, str], Result]:
     ply = decks.isotropic(70000.0, 0.3, 2.7e-9, 5.0 / 6.0)
     plate = decks.material(ply, (0.0,), 2.0 / SCALE)
     load, macros = float(row["load_value"]), decks.program(NEWTON)
-    made = decks.quarter_plate(8, plate, macros, load, EDGES[case], (decks.MITC, NONL))
-    return row, decks.run_of_deck(made)
+    quarter = decks.quarter_plate(8, plate, macros, load, EDGES[case], (decks.MITC, NONL))
+    return row, decks.run_of_deck(quarter)
 
 
 @pytest.mark.parametrize(
@@ -285,10 +285,12 @@ def stretched() -> Result:
 
 
 def test_the_stored_strain_energy_is_that_of_the_internal_forces() -> None:
-    found = stretched()
-    rows = np.searchsorted(found.energy.step, found.membrane.step)
-    assert found.membrane.step.tolist() == found.tape8.step.tolist()
-    np.testing.assert_allclose(found.membrane.strain_energy, found.energy.plate_strain[rows], 1e-9)
+    stretched_plate = stretched()
+    rows = np.searchsorted(stretched_plate.energy.step, stretched_plate.membrane.step)
+    assert stretched_plate.membrane.step.tolist() == stretched_plate.tape8.step.tolist()
+    np.testing.assert_allclose(
+        stretched_plate.membrane.strain_energy, stretched_plate.energy.plate_strain[rows], 1e-9
+    )
 
 
 def test_only_nonlinear_plates_say_so_and_store_their_membrane() -> None:
@@ -300,25 +302,33 @@ def test_only_nonlinear_plates_say_so_and_store_their_membrane() -> None:
 
 
 def test_exposures_are_those_of_the_stored_stresses() -> None:
-    found = stretched()
-    sigma_1, sigma_2, tau = found.plies.sigma_1, found.plies.sigma_2, np.abs(found.plies.tau_12)
+    stretched_plate = stretched()
+    sigma_1, sigma_2, tau = (
+        stretched_plate.plies.sigma_1,
+        stretched_plate.plies.sigma_2,
+        np.abs(stretched_plate.plies.tau_12),
+    )
     s = STRENGTHS
     ratios = [sigma_1 / s.xt, -sigma_1 / s.xc, sigma_2 / s.yt, -sigma_2 / s.yc, tau / s.s12]
     right = np.max(ratios, axis=(0, 1))
-    np.testing.assert_allclose(found.failure.max_stress.exposure, right, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        stretched_plate.failure.max_stress.exposure, right, rtol=1e-9, atol=1e-12
+    )
     # In bending alone the stresses of both faces of the plate are opposite.
-    faces = found.plies.sigma_1[..., [0, 3], [0, 1]].sum(axis=-1)
+    faces = stretched_plate.plies.sigma_1[..., [0, 3], [0, 1]].sum(axis=-1)
     assert faces.max() > 0.1 * sigma_1.max()
 
 
 def test_gages_of_a_run_read_what_the_stored_displacements_say() -> None:
-    found = stretched()
+    stretched_plate = stretched()
     (problem,) = load_deck(struck(NONL, GAGES)).problems
-    made = gages(problem.mesh, GAGES.records, nonlinear=True)
-    rows = np.searchsorted(found.gages.step, found.tape3.step)
-    fields = found.tape3.displacement.reshape(len(rows), -1)
-    strains = made.strains((fields[:, made.dof_indices] * made.weights).sum(axis=2))
-    np.testing.assert_allclose(found.gages.strain[rows], strains, rtol=1e-9, atol=1e-13)
+    gage_cards = gages(problem.mesh, GAGES.records, nonlinear=True)
+    rows = np.searchsorted(stretched_plate.gages.step, stretched_plate.tape3.step)
+    fields = stretched_plate.tape3.displacement.reshape(len(rows), -1)
+    strains = gage_cards.strains(
+        (fields[:, gage_cards.dof_indices] * gage_cards.weights).sum(axis=2)
+    )
+    np.testing.assert_allclose(stretched_plate.gages.strain[rows], strains, rtol=1e-9, atol=1e-13)
     linear = gages(problem.mesh, GAGES.records)
     without = linear.strains((fields[:, linear.dof_indices] * linear.weights).sum(axis=2))
     assert (strains - without)[-1, 0] > 0.1 * strains[-1, 0]
@@ -338,10 +348,12 @@ def test_kernels_store_what_numpy_does() -> None:
 
 
 def test_a_preloaded_plate_stores_the_energy_of_its_preload() -> None:
-    found = fecm.run_one(struck(NONL, model.Preload(20.0, 10.0), steps=60))
-    rows = np.searchsorted(found.energy.step, found.membrane.step)
-    assert found.membrane.preload_energy[-1] > 0.0
-    np.testing.assert_allclose(found.membrane.strain_energy, found.energy.plate_strain[rows], 1e-9)
+    result = fecm.run_one(struck(NONL, model.Preload(20.0, 10.0), steps=60))
+    rows = np.searchsorted(result.energy.step, result.membrane.step)
+    assert result.membrane.preload_energy[-1] > 0.0
+    np.testing.assert_allclose(
+        result.membrane.strain_energy, result.energy.plate_strain[rows], 1e-9
+    )
     assert "membrane/preload_energy" not in stretched()
 
 
@@ -351,10 +363,10 @@ def test_the_membrane_force_of_a_preloaded_plate_contains_the_preload() -> None:
     plate = deck.require(model.Material)
     gauss_points = replace(plate, integration=replace(plate.integration, points=3))
     segments = tuple(gauss_points if one is plate else one for one in deck.segments)
-    found = fecm.run_one(replace(deck, segments=segments))
-    N = np.stack([found[f"stresses/{name}"][0] for name in ("N_x", "N_y", "N_xy")], axis=-1)
+    result = fecm.run_one(replace(deck, segments=segments))
+    N = np.stack([result[f"stresses/{name}"][0] for name in ("N_x", "N_y", "N_xy")], axis=-1)
     largest = max(principal(force)[1] for force in N.reshape(-1, 3))
-    assert found.membrane.largest_force[0] == pytest.approx(largest, rel=1e-9)
+    assert result.membrane.largest_force[0] == pytest.approx(largest, rel=1e-9)
     # Far from the load the plate is still at rest.
     np.testing.assert_allclose(N[0, 0], (20.0, 10.0, 5.0), atol=3.0)
 
@@ -363,11 +375,13 @@ def test_the_membrane_force_of_a_preloaded_plate_contains_the_preload() -> None:
 
 
 def test_the_summary_has_the_share_of_the_membrane_at_the_peak() -> None:
-    found = stretched()
-    (line,) = (line for line in run_summary(found) if line.startswith("membrane"))
-    peak = found.time[found.force.argmax()]
-    row = np.abs(found.membrane.time - peak).argmin()
-    share = 100.0 * found.membrane.energy[row] / found.membrane.strain_energy[row]
+    stretched_plate = stretched()
+    (line,) = (line for line in run_summary(stretched_plate) if line.startswith("membrane"))
+    peak = stretched_plate.time[stretched_plate.force.argmax()]
+    row = np.abs(stretched_plate.membrane.time - peak).argmin()
+    share = (
+        100.0 * stretched_plate.membrane.energy[row] / stretched_plate.membrane.strain_energy[row]
+    )
     assert line.startswith(f"membrane          {share:.{int(share < 9.5)}f} % of the strain energy")
     assert line.endswith("at the peak")
     rare = fecm.run_one(struck(NONL, steps=60, every=50))
@@ -395,13 +409,13 @@ def test_a_nonlinear_case_is_not_beyond_the_linear_plate() -> None:
 
 
 def test_a_steep_slope_is_a_doubt_with_its_error() -> None:
-    found = fecm.run_one(struck(NONL, velocity=150000.0, steps=150, every=10, thickness=1.0))
-    slope = found.membrane.largest_slope.max()
+    result = fecm.run_one(struck(NONL, velocity=150000.0, steps=150, every=10, thickness=1.0))
+    slope = result.membrane.largest_slope.max()
     assert slope > 0.25
-    (note,) = (note for note in found.notes if "slope" in note)
+    (note,) = (note for note in result.notes if "slope" in note)
     assert f"the slope reaches {slope:.3g} at time" in note
     assert f"{slope**2 / 2.0:.1%}" in note
-    assert "slope > 0.25" in found.validity
+    assert "slope > 0.25" in result.validity
     assert stretched().membrane.largest_slope.max() < 0.25
     assert not [note for note in stretched().notes if "slope" in note]
 
@@ -417,8 +431,8 @@ def finished(dt: float = 0.0) -> tuple[Simulation, MemorySink]:
 def changed(sink: MemorySink, **constants: float) -> Result:
     """The result of a run of which columns of the membrane are constants."""
     rows = np.ones_like(sink.arrays["membrane/time"])
-    own = {f"membrane/{name}": rows * value for name, value in constants.items()}
-    return Result({**sink.arrays, **own}, {}, {})
+    by_name = {f"membrane/{name}": rows * value for name, value in constants.items()}
+    return Result({**sink.arrays, **by_name}, {}, {})
 
 
 def doubts(dt: float = 0.0, **constants: float) -> list[str]:

@@ -148,9 +148,9 @@ def test_the_internal_force_is_the_gradient_of_the_strain_energy(
     corners: Corners, seed: int, curvature: Curvature
 ) -> None:
     *values, _ = forces_of(one(corners, seed, curvature))(state())
-    found = np.array(values)
+    array = np.array(values)
     wanted = gradient(corners, seed, curvature)[:, -1]
-    assert np.abs(found - wanted).max() < 1e-9 * np.abs(found).max()
+    assert np.abs(array - wanted).max() < 1e-9 * np.abs(array).max()
 
 
 @ELEMENTS
@@ -160,10 +160,10 @@ def test_the_tangent_is_the_gradient_of_the_internal_force(
 ) -> None:
     plate, field = one(corners, seed, curvature), state()
     (family,) = plate.families
-    found = plate.stiffness_of(family)[0] + tangent(plate, family, field)[0]
+    value = plate.stiffness_of(family)[0] + tangent(plate, family, field)[0]
     wanted = gradient(corners, seed, curvature)[:, :-1]
-    assert np.abs(found - wanted).max() < 1e-9 * np.abs(found).max()
-    np.testing.assert_array_equal(found, found.T)
+    assert np.abs(value - wanted).max() < 1e-9 * np.abs(value).max()
+    np.testing.assert_array_equal(value, value.T)
 
 
 @ELEMENTS
@@ -256,9 +256,9 @@ def rectangles() -> dict[str, list[Row]]:
 
 def at(rows: list[Row], column: str, *deflections: float) -> list[Row]:
     """The rows at some deflections over the thickness."""
-    found = [row for row in rows if float(row[column]) in deflections]
-    assert len(found) == len(deflections)
-    return found
+    values = [row for row in rows if float(row[column]) in deflections]
+    assert len(values) == len(deflections)
+    return values
 
 
 def solved(name: str, rows: list[Row], n: int) -> list[tuple[float, float]]:
@@ -274,11 +274,11 @@ def solved(name: str, rows: list[Row], n: int) -> list[tuple[float, float]]:
     field, errors = None, []
     for row in rows:
         deflection = float(row["sign"]) * float(row["control_over_h"]) * H
-        found = equilibrium(plate, forces, weights, deflection, field)
-        field = found.field
+        solution = equilibrium(plate, forces, weights, deflection, field)
+        field = solution.field
         errors.append((
-            found.load / float(row["load_value"]) - 1.0,
-            found.energy / float(row["strain_energy_mJ"]) - 1.0,
+            solution.load / float(row["load_value"]) - 1.0,
+            solution.energy / float(row["strain_energy_mJ"]) - 1.0,
         ))  # fmt: skip
     return errors
 
@@ -320,11 +320,11 @@ def test_levys_clamped_plate_deflects_as_computed() -> None:
     plate = rectangle(a, a, 8, isotropic(0.1**0.5, h), "clamped_immovable")
     load, weights, field = pressure(plate), centre(plate), None
     for row in table("nonlinear_levy.csv")[::4]:
-        found = equilibrium(plate, load, weights, float(row["this_w_over_h"]) * h, field)
-        field = found.field
+        solution = equilibrium(plate, load, weights, float(row["this_w_over_h"]) * h, field)
+        field = solution.field
         wanted = float(row["q_a4_over_E_h4"]) * E * h**4 / a**4
         # The load rises faster than the deflection, so that its error is the larger one.
-        assert found.load == pytest.approx(wanted, rel=3e-4)
+        assert solution.load == pytest.approx(wanted, rel=3e-4)
 
 
 def circle(edge: str, load: str) -> object:
@@ -353,10 +353,10 @@ def test_circular_plates_follow_the_axisymmetric_solution(edge: str, load: str) 
     forces = pressure(plate) if kind == "uniform" else patch(plate, "DISC", float(radius))
     field, weights = None, centre(plate)
     for row in at(rows, "w0_over_h", 1.0, 3.0):
-        found = equilibrium(plate, forces, weights, float(row["w0_over_h"]) * H, field)
-        field = found.field
-        assert found.load == pytest.approx(float(row["load_value"]), rel=1e-3)
-        assert found.energy == pytest.approx(float(row["strain_energy_mJ"]), rel=3e-3)
+        solution = equilibrium(plate, forces, weights, float(row["w0_over_h"]) * H, field)
+        field = solution.field
+        assert solution.load == pytest.approx(float(row["load_value"]), rel=1e-3)
+        assert solution.energy == pytest.approx(float(row["strain_energy_mJ"]), rel=3e-3)
 
 
 @pytest.mark.parametrize("ends", ["pinned", "clamped"])
@@ -389,9 +389,9 @@ def test_an_unsymmetric_strip_bends_as_the_closed_form_for_both_signs_of_the_loa
     load, weights, field = pressure(plate), centre(plate), None
     assert len(rows) == 5
     for row in rows:
-        found = equilibrium(plate, load, weights, float(row["w_centre_mm"]), field)
-        field = found.field
-        assert found.load == pytest.approx(float(row["q_N_per_mm2"]), rel=5e-5)
+        solution = equilibrium(plate, load, weights, float(row["w_centre_mm"]), field)
+        field = solution.field
+        assert solution.load == pytest.approx(float(row["q_N_per_mm2"]), rel=5e-5)
 
 
 # Initial membrane force ---------------------------------------------------------------------------
@@ -405,11 +405,13 @@ def test_a_plate_with_preload_stretches_as_the_spectral_solution(ratio: str) -> 
     plate = with_preload(rectangle(100.0, 100.0, 8, isotropic(), "ss_immovable"), N0, N0)
     load, weights, field = pressure(plate), centre(plate), None
     for row in at(rows, "w_centre_over_h", 0.5, 3.0):
-        found = equilibrium(plate, load, weights, float(row["w_centre_over_h"]) * H, field)
-        field = found.field
-        assert found.load == pytest.approx(float(row["q_N_per_mm2"]), rel=4e-4)
+        solution = equilibrium(plate, load, weights, float(row["w_centre_over_h"]) * H, field)
+        field = solution.field
+        assert solution.load == pytest.approx(float(row["q_N_per_mm2"]), rel=4e-4)
         # The strain energy contains N0's work on the slopes.
-        assert found.energy == pytest.approx(float(row["strain_energy_above_preload_mJ"]), rel=4e-4)
+        assert solution.energy == pytest.approx(
+            float(row["strain_energy_above_preload_mJ"]), rel=4e-4
+        )
 
 
 def test_a_preload_by_displaced_edges_is_that_of_the_card() -> None:

@@ -93,28 +93,28 @@ def test_cases_are_tasks_of_their_own_and_resume() -> None:
 def test_a_search_takes_few_runs_and_its_velocity_gives_the_same_run_again(
     runs: list[float],
 ) -> None:
-    found = fecm.sweep(DECK, {"k": [6e4]}, until="threshold")
+    swept = fecm.sweep(DECK, {"k": [6e4]}, until="threshold")
     assert 3 <= len(runs) <= 6
-    assert THRESHOLD <= found["peak_force"][0] <= THRESHOLD * (1.0 + 2e-5)
-    velocity = float(found["found_velocity"][0])
-    assert found["found_energy"][0] == pytest.approx(0.5 * 2e-5 * velocity**2, rel=1e-12)
+    assert THRESHOLD <= swept["peak_force"][0] <= THRESHOLD * (1.0 + 2e-5)
+    velocity = float(swept["found_velocity"][0])
+    assert swept["found_energy"][0] == pytest.approx(0.5 * 2e-5 * velocity**2, rel=1e-12)
     again = fecm.sweep(DECK, {"k": [6e4], "velocity": [velocity]})
     for name in again.summary:
         if again[name].dtype.kind == "f":
-            np.testing.assert_allclose(again[name][0], found[name][0], rtol=1e-9)
+            np.testing.assert_allclose(again[name][0], swept[name][0], rtol=1e-9)
 
 
 def test_a_search_starts_at_the_quick_models_and_lengthens_runs_that_end_too_early(
     runs: list[float],
 ) -> None:
-    found = fecm.sweep(DECK.replace("LOOP        600", "LOOP        120"), until=20.0)
+    swept = fecm.sweep(DECK.replace("LOOP        600", "LOOP        120"), until=20.0)
     assert np.isnan(runs[0])
-    assert found.steps[0] in (240, 480)
-    assert found["peak_force"][0] == pytest.approx(20.0, rel=2e-5)
+    assert swept.steps[0] in (240, 480)
+    assert swept["peak_force"][0] == pytest.approx(20.0, rel=2e-5)
     starts = [velocity_at(problem_of(DECK.replace("600.0", v)), 20.0) for v in ("600.0", "  6.0")]
     assert starts[0] == pytest.approx(starts[1], rel=1e-8)
     # Both models are too soft.
-    assert 1.0 < starts[0] / found["found_velocity"][0] < 1.3
+    assert 1.0 < starts[0] / swept["found_velocity"][0] < 1.3
 
 
 @pytest.mark.long
@@ -192,9 +192,9 @@ def test_the_estimate_of_a_nonlinear_plate_has_a_static_row_from_its_curve(tmp_p
     (tmp_path / "d.inp").write_text(HEAVY.replace(PROGRAM, program))
     done = call("estimate", "d.inp", "--format", "json", cwd=tmp_path)
     assert done.exit_code == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert "9 to 26 % low in force at M/M_plate = 24" in found["nonlinear"]
-    rows = {row["model"]: row for row in found["models"]}
+    document = json.loads(done.stdout)
+    assert "9 to 26 % low in force at M/M_plate = 24" in document["nonlinear"]
+    rows = {row["model"]: row for row in document["models"]}
     assert [*rows] == ["infinite plate", "static plate", "nonlinear static plate", "run"]
     assert [row["applies"] for row in rows.values()] == [False, False, True, True]
     static = rows["nonlinear static plate"]
@@ -216,9 +216,9 @@ def test_the_estimate_of_a_nonlinear_plate_has_a_static_row_from_its_curve(tmp_p
 
 
 def test_the_row_of_a_linear_deck_stays_alone() -> None:
-    found = quick_estimate(problem_of(LINEAR))
-    assert [model.name for model in found.models] == ["infinite plate", "static plate"]
-    assert found.remark == ""
+    estimate = quick_estimate(problem_of(LINEAR))
+    assert [model.name for model in estimate.models] == ["infinite plate", "static plate"]
+    assert estimate.remark == ""
 
 
 def test_both_static_rows_of_a_small_deflection_agree_and_apply() -> None:
@@ -227,8 +227,8 @@ def test_both_static_rows_of_a_small_deflection_agree_and_apply() -> None:
         replace(segment, velocity=0.02) if isinstance(segment, Impact) else segment
         for segment in problem.deck.segments
     )
-    found = quick_estimate(replace(problem, deck=replace(problem.deck, segments=slow)))
-    _, static, nonlinear = found.models
+    estimate = quick_estimate(replace(problem, deck=replace(problem.deck, segments=slow)))
+    _, static, nonlinear = estimate.models
     assert static.applies
     assert nonlinear.applies
     assert nonlinear.impact.peak == pytest.approx(static.impact.peak, rel=1e-6)
@@ -239,9 +239,9 @@ def test_a_loaded_plate_has_no_static_curve() -> None:
     loaded = problem_of(text(PROGRAM, data=BLOW + forces(1.0)))
     with pytest.raises(NoCurveError, match="no nonlinear static plate: the deck has FORC"):
         nonlinear_curve(loaded, 1.0, np.nan)
-    found = quick_estimate(loaded)
-    assert "FORC" in found.remark
-    assert [model.name for model in found.models] == ["infinite plate", "static plate"]
+    estimate = quick_estimate(loaded)
+    assert "FORC" in estimate.remark
+    assert [model.name for model in estimate.models] == ["infinite plate", "static plate"]
     heavy = problem_of(text(PROGRAM, data=BLOW.replace("2e-5", "2e-2") + forces(1.0)))
     static = quick_estimate(heavy).models[1]
     assert velocity_at(heavy, static.threshold) == pytest.approx(static.velocity, rel=1e-8)

@@ -452,18 +452,18 @@ def test_the_mesh_of_another_programs_input_file_can_be_taken(tmp_path: Path) ->
 )
 def test_meshes_that_cannot_be_meant_exit_2(options: list[str], message: str) -> None:
     pytest.importorskip("meshio", reason="meshes are read by meshio")
-    made = call("new", "-", *options, *PLY, *SI, *LAW_OPTION, *MASS_OPTION, *GO)
-    assert_unusable(made)
-    assert message in made.stderr
+    answer = call("new", "-", *options, *PLY, *SI, *LAW_OPTION, *MASS_OPTION, *GO)
+    assert_unusable(answer)
+    assert message in answer.stderr
 
 
 def test_without_meshio_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "meshio", None)
     with pytest.raises(ImportError, match=r"pip install 'fecm\[mesh\]'"):
         fecm.Plate.from_mesh(CIRCLE)
-    made = call("new", "-", "--mesh", CIRCLE, *PLY, *SI, *LAW_OPTION, *MASS_OPTION, *GO)
-    assert_unusable(made)
-    assert "pip install 'fecm[mesh]'" in made.stderr
+    answer = call("new", "-", "--mesh", CIRCLE, *PLY, *SI, *LAW_OPTION, *MASS_OPTION, *GO)
+    assert_unusable(answer)
+    assert "pip install 'fecm[mesh]'" in answer.stderr
 
 
 @pytest.mark.parametrize("kinds", [["triangle", "quad"], ["tetra"], ["line"]])

@@ -195,13 +195,13 @@ def test_the_printed_program_has_no_over(tmp_path: Path) -> None:
 
 def test_a_sweep_of_a_deck_with_over_knows_what_its_runs_know() -> None:
     deck = model(until_over())
-    found = fecm.sweep(deck, {"velocity": [60.0, 115.0]}, history=True)
+    swept = fecm.sweep(deck, {"velocity": [60.0, 115.0]}, history=True)
     for number, velocity in enumerate((60.0, 115.0)):
         run = fecm.run_one(deck.with_(velocity=velocity))
         for name in ("peak_force", "rebound_velocity", "impulse", "contacts"):
-            assert found[name][number] == pytest.approx(run.metrics[name], rel=1e-7)
-    assert found.force is not None
-    assert found.force.shape[1] < 16000
+            assert swept[name][number] == pytest.approx(run.metrics[name], rel=1e-7)
+    assert swept.force is not None
+    assert swept.force.shape[1] < 16000
 
 
 def test_a_new_deck_without_a_duration_ends_by_itself() -> None:
@@ -216,12 +216,12 @@ def test_a_new_deck_without_a_duration_ends_by_itself() -> None:
         )
 
     for support, mass in (("simple", 1e-3), ("clamped", 2e-5), ("free", 1e-4)):
-        made = deck(support, mass)
-        words = [macro.word for macro in made.macros]
+        text = deck(support, mass)
+        words = [macro.word for macro in text.macros]
         assert words[-2:] == ["OVER", "NEXT"]
-        run = fecm.run_one(made)
+        run = fecm.run_one(text)
         assert run.end is End.OVER
-        assert len(run.force) < made.macros[words.index("LOOP")].value
+        assert len(run.force) < text.macros[words.index("LOOP")].value
     fixed = fecm.impact(
         fecm.Plate.rectangle((100, 80), (4, 4), support="simple"),
         fecm.Laminate("[0/90]2s", "T300/5208", 0.25),

@@ -117,8 +117,8 @@ def notes_of(path: Path, names: tuple[str, ...] | None) -> set[str]:
 def told(templates: Iterable[str]) -> set[str]:
     """Texts that tell a note from others, between the sizes in templates."""
     parts = (part for text in templates for part in re.split(r"\{[^}]*\}", text))
-    found = {" ".join(part.split()).removesuffix(",") for part in parts}
-    return {text for text in found if len(text.split()) >= FEWEST_WORDS}
+    names = {" ".join(part.split()).removesuffix(",") for part in parts}
+    return {text for text in names if len(text.split()) >= FEWEST_WORDS}
 
 
 def rows() -> Iterator[str]:
@@ -178,8 +178,8 @@ def test_a_slip_on_the_page_of_units_is_found(row: list[str]) -> None:
     lines[slipped] = lines[slipped].replace(right, wrong)
     if lines[slipped] != wrong:  # with commas, a longer value needs no column
         lines[slipped] = ",".join(re.split(r" +|,", lines[slipped].strip()))
-    found = {finding.code for finding in fecm.check("\n".join(lines) + "\n").findings}
-    assert set(codes.split(", ")) <= found
+    names = {finding.code for finding in fecm.check("\n".join(lines) + "\n").findings}
+    assert set(codes.split(", ")) <= names
 
 
 def has(line: str, value: str) -> bool:

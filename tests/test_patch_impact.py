@@ -190,9 +190,9 @@ def test_plate_w_is_the_weighted_mean_of_w() -> None:
 
 def test_the_energy_balance_holds_with_a_patch_over_4000_steps() -> None:
     text = LONG.read_text().replace("EXPE", "PATC\nDISC        0.0347\nSHEA MITC\nEXPE")
-    found = fecm.run_one(text)
-    initial = found.energy.attributes["initial"]
-    assert np.abs(found["energy/balance_error"]).max() < 1e-5 * initial
+    result = fecm.run_one(text)
+    initial = result.energy.attributes["initial"]
+    assert np.abs(result["energy/balance_error"]).max() < 1e-5 * initial
 
 
 @pytest.mark.parametrize("steps", ["EXCD", "static"])

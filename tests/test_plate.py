@@ -69,8 +69,8 @@ def test_a_patch_of_distorted_elements_reproduces_constant_membrane_strain(
     field = stretched(mesh[0], STRAIN)
     assert residual(mesh, field) < 1e-14
     used = np.isin(np.arange(1, len(field) + 1), mesh[1])
-    found = equilibrium(patch(mesh, field))
-    np.testing.assert_allclose(found[used], field[used], atol=1e-11)
+    solution = equilibrium(patch(mesh, field))
+    np.testing.assert_allclose(solution[used], field[used], atol=1e-11)
 
 
 @pytest.mark.parametrize(("maker", "kind"), STRETCHED_PATCHES)
@@ -156,8 +156,8 @@ def test_the_energy_of_an_unsymmetric_element_is_that_of_its_layers(
             strain = STRAIN + z * CURVATURE
             energy += area_of(corners) * thickness / 2.0 * (strain @ Q @ strain) / 2.0
         lower += thickness
-    found = 0.5 * field @ free_stiffness((coordinates, elements)) @ field
-    assert found == pytest.approx(energy, rel=1e-12)
+    value = 0.5 * field @ free_stiffness((coordinates, elements)) @ field
+    assert value == pytest.approx(energy, rel=1e-12)
 
 
 # The stiffness as a whole ------------------------------------------------------------------------

@@ -27,10 +27,10 @@ def deflection(deck: fecm.Deck) -> float:
 
 def test_modes_of_a_plate_from_objects_are_those_of_bending() -> None:
     deck = fecm.plate_deck(SQUARE, METAL, MODES, units="mm-N-s")
-    found = fecm.run_one(deck).modes.angular_frequency
+    angular_frequency = fecm.run_one(deck).modes.angular_frequency
     # Thin plate on simple supports: 1, 1 and the pair 1, 2 (Leissa).
     lowest = 2.0 * (math.pi / SIDE) ** 2 * math.sqrt(RIGIDITY / (RHO * H))
-    np.testing.assert_allclose(found, lowest * np.array([1.0, 2.5, 2.5]), rtol=0.01)
+    np.testing.assert_allclose(angular_frequency, lowest * np.array([1.0, 2.5, 2.5]), rtol=0.01)
 
 
 def test_the_static_deflection_of_a_plate_from_objects_is_timoshenkos() -> None:

@@ -48,8 +48,8 @@ def test_strains_of_plies_times_the_stiffness_of_the_ply_are_their_stresses(resu
     strains = np.stack([plies.eps_1, plies.eps_2, plies.gamma_12], axis=-1)
     stresses = np.stack([plies.sigma_1, plies.sigma_2, plies.tau_12], axis=-1)
     assert stresses.shape == (2, 2, 9, 2, 2, 3)
-    found = strains @ turned_stiffness(REPORT_PLY, 0.0)
-    np.testing.assert_allclose(found, stresses, rtol=1e-9, atol=1e-12 * np.abs(stresses).max())
+    value = strains @ turned_stiffness(REPORT_PLY, 0.0)
+    np.testing.assert_allclose(value, stresses, rtol=1e-9, atol=1e-12 * np.abs(stresses).max())
     np.testing.assert_array_equal(plies.sigma_1, result["plies/sigma_1"])
     np.testing.assert_array_equal(plies.angles, [0.0, 90.0])
 
@@ -256,8 +256,8 @@ def test_info_and_diff_show_patch_and_plies(file: Path, tmp_path: Path) -> None:
     assert "plies: stresses ply by ply" in shown
     assert "radius = 0.2" in shown
     fecm.run(DECK.replace("115.0", "116.0"), output=tmp_path / "faster.h5")
-    found = call("diff", file, tmp_path / "faster.h5", "--rtol", ".05")
-    assert found.exit_code == 0, found.stdout
+    answer = call("diff", file, tmp_path / "faster.h5", "--rtol", ".05")
+    assert answer.exit_code == 0, answer.stdout
 
 
 def test_the_residual_is_compared_on_the_scale_of_the_stresses(file: Path, tmp_path: Path) -> None:

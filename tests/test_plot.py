@@ -143,8 +143,8 @@ def test_on_a_distorted_mesh_the_line_is_interpolated_in_its_elements(result: Re
 @pytest.mark.parametrize("kind", [3, 4, 8, 9, 10, 12])
 def test_elements_of_every_family_cover_the_plate_and_carry_linear_fields(kind: int) -> None:
     coordinates, elements = distorted_square(3, 3, kind)
-    made = Result({"mesh/coordinates": coordinates, "mesh/elements": elements}, {}, {})
-    cut = patches(made, 3)
+    built = Result({"mesh/coordinates": coordinates, "mesh/elements": elements}, {}, {})
+    cut = patches(built, 3)
     first, second = (
         cut.points[cut.triangles[:, n]] - cut.points[cut.triangles[:, 0]] for n in (1, 2)
     )
@@ -387,9 +387,9 @@ def test_force_draws_the_delamination_threshold_if_there_is_one(result: Result) 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, "high", None])
 def test_a_threshold_without_sense_is_refused(result: Result, value: Any) -> None:
     arrays = {path: result[path] for path in result}
-    made = Result(arrays, {"deck": result.deck_text}, {"threshold": {"force": value}})
+    built = Result(arrays, {"deck": result.deck_text}, {"threshold": {"force": value}})
     with pytest.raises(PlotError, match="odd has a delamination threshold that can't be drawn"):
-        draw("force", {"odd": made})
+        draw("force", {"odd": built})
 
 
 # What is missing --------------------------------------------------------------------------------

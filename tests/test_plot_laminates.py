@@ -73,8 +73,8 @@ def test_failure_leaves_plies_without_strengths_blank(plate: Result, quantity: s
     # The largest at each point of the criteria that are shown, of the plies with strengths.
     shown = (quantity,) if quantity else NAMES[:4]
     with np.errstate(invalid="ignore"):
-        own = [np.fmax.reduce(plate[f"failure/{n}/exposure"], axis=(2, 3)) for n in shown]
-    wanted = np.max(own, axis=0)[plate["failure/under_load"] == 0]
+        values = [np.fmax.reduce(plate[f"failure/{n}/exposure"], axis=(2, 3)) for n in shown]
+    wanted = np.max(values, axis=0)[plate["failure/under_load"] == 0]
     np.testing.assert_array_equal(drawn, wanted)
     assert np.isnan(drawn).any()  # laminate 3
     assert np.isfinite(drawn).any()

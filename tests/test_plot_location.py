@@ -104,10 +104,10 @@ def test_gages_are_lines_in_their_directions_at_their_places_with_their_numbers(
 
 
 def test_the_second_panel_shows_the_ellipse_from_the_place_found() -> None:
-    found = located()
-    axes = axes_of(found)["zoom"]
+    location = located()
+    axes = axes_of(location)["zoom"]
     drawn = np.array(axes.get_lines()[0].get_data()).T
-    np.testing.assert_allclose(drawn, found.ellipse() - [1.5, 1.2])
+    np.testing.assert_allclose(drawn, location.ellipse() - [1.5, 1.2])
     assert np.abs(drawn).max() < axes.get_xlim()[1]
     assert axes.get_xlabel() == "$x$ from the place found (in)"
 
@@ -166,9 +166,9 @@ def test_kinds_of_runs_and_of_locations_do_not_show_each_other() -> None:
 
 
 def test_the_command_draws_the_file_as_the_method_draws_the_location(tmp_path: Path) -> None:
-    found = located()
-    found.save(tmp_path / "located.h5")
-    found.plot(tmp_path / "own.png")
+    location = located()
+    location.save(tmp_path / "located.h5")
+    location.plot(tmp_path / "own.png")
     done = call("plot", "located.h5", cwd=tmp_path)
     assert (done.exit_code, done.stdout, done.stderr) == (0, "located-location.png\n", "")
     drawn = tmp_path / "located-location.png"

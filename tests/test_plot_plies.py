@@ -117,9 +117,9 @@ def test_thickness_of_elements_without_nine_nodes_shows_in_plane_stresses(plies:
     arrays = {path: plies[path] for path in plies}
     for name in ("tau_xz", "tau_yz", "residual"):
         arrays[f"plies/{name}"] = np.full_like(arrays[f"plies/{name}"], np.nan)
-    made = Result(arrays, {"deck": plies.deck_text}, {"patch": plies.patch.attributes})
+    result = Result(arrays, {"deck": plies.deck_text}, {"patch": plies.patch.attributes})
     with pytest.warns(FecmWarning, match="does not have nine nodes"):
-        figure = plot(made, "thickness")
+        figure = plot(result, "thickness")
     assert sum(axes.axison for axes in figure.axes) == 3
 
 

@@ -109,8 +109,8 @@ def test_a_refused_picture_leaves_no_empty_figure(
 def test_the_users_style_holds_where_it_differs_from_that_of_matplotlib(
     result: fecm.Result,
 ) -> None:
-    own = {"lines.linewidth": 3.5, "axes.prop_cycle": matplotlib.cycler(color=["red", "lime"])}
-    with matplotlib.rc_context(own):
+    by_name = {"lines.linewidth": 3.5, "axes.prop_cycle": matplotlib.cycler(color=["red", "lime"])}
+    with matplotlib.rc_context(by_name):
         lines = result.plot("force").get_lines()
         assert [(line.get_linewidth(), line.get_color()) for line in lines] == [
             (3.5, "red"),

@@ -153,8 +153,8 @@ def test_every_product_with_the_stiffness_sees_the_preload(maker: MeshMaker, kin
     scale = np.abs(expected).max()
     assert np.abs(without.stiffness @ u - expected).max() > 0.01 * scale
     for solver in ("numpy", "csr"):
-        found = stiffness_operator(model, solver)(u)
-        np.testing.assert_allclose(found, expected, atol=1e-13 * scale)
+        product = stiffness_operator(model, solver)(u)
+        np.testing.assert_allclose(product, expected, atol=1e-13 * scale)
     internal = model.internal_forces(model.field(u))[model.mesh.equations > 0]
     np.testing.assert_allclose(internal, expected, atol=1e-13 * scale)
 
@@ -177,15 +177,15 @@ def reference_frequencies() -> dict[Force, list[tuple[int, int, float]]]:
 @pytest.mark.few(1)  # of 4, 0.2 s each
 def test_frequencies_under_a_preload_are_naviers(preload: Force) -> None:
     plate = replace(reference_plate(16), preload=preload)
-    found = modes(plate, 24, consistent=False)
-    shapes = np.array([plate.field(shape, 0.0)[:, 2] for shape in found.shapes])
+    eigenmodes = modes(plate, 24, consistent=False)
+    shapes = np.array([plate.field(shape, 0.0)[:, 2] for shape in eigenmodes.shapes])
     shapes /= np.linalg.norm(shapes, axis=1)[:, None]
     x, y = np.pi * plate.mesh.coordinates.T / SIDE
     for m, n, frequency in reference_frequencies()[preload]:
         wave = np.sin(m * x) * np.sin(n * y)
         alike = np.abs(shapes @ wave) / np.linalg.norm(wave)
         assert alike.max() > 0.999
-        hertz = found.angular_frequency[alike.argmax()] / (2.0 * np.pi)
+        hertz = eigenmodes.angular_frequency[alike.argmax()] / (2.0 * np.pi)
         assert hertz == pytest.approx(frequency, rel=2e-4), (m, n)
 
 
@@ -501,8 +501,8 @@ def test_damping_is_compared_with_a_frequency_under_the_preload() -> None:
 def test_waves_say_that_they_leave_the_preload_out(tmp_path: Path) -> None:
     for text, said in ((preloaded("100."), True), (base(), False)):
         (tmp_path / "plate.inp").write_text(text)
-        told = call("waves", "dispersion", tmp_path / "plate.inp", "--wavelengths", "5:6:2")
-        assert ("PREL is left out" in told.stderr) == said
+        answer = call("waves", "dispersion", tmp_path / "plate.inp", "--wavelengths", "5:6:2")
+        assert ("PREL is left out" in answer.stderr) == said
 
 
 def test_a_ply_that_the_preload_fails_has_failed_at_time_zero() -> None:
@@ -555,11 +555,11 @@ def summary_of(case: str) -> dict[str, str]:
 def test_an_impact_under_preload_is_that_of_the_exact_modal_series(case: str) -> None:
     row = summary_of(case)
     ends = float(row["first_contact_end_s"])
-    found = fecm.run_one(struck(32, row, 1.02 * max(ends, *map(float, extremes(row)))))
-    w, touches = found["history/plate_w"], found.force > 0.0
-    assert found.force.max() == pytest.approx(float(row["peak_N"]), rel=2e-3)
+    result = fecm.run_one(struck(32, row, 1.02 * max(ends, *map(float, extremes(row)))))
+    w, touches = result["history/plate_w"], result.force > 0.0
+    assert result.force.max() == pytest.approx(float(row["peak_N"]), rel=2e-3)
     assert w.max() == pytest.approx(float(row["W_max_mm"]), rel=1e-3)
-    last = found.time[1:][touches[:-1] & ~touches[1:]]
+    last = result.time[1:][touches[:-1] & ~touches[1:]]
     assert last[0] == pytest.approx(ends, abs=1e-6)
 
 
@@ -581,9 +581,9 @@ def test_the_history_of_an_impact_under_preload_is_that_of_the_series(
     row, exact = summary_of(case), table(f"preload_impact_{case}.csv")
     time, F, w = (np.array([float(one[name]) for one in exact]) for name in ("t_s", "F_N", "W_mm"))
     first = time < 1.1 * float(row["first_contact_end_s"])
-    found = fecm.run_one(struck(32, row, float(time[first][-1])))
-    F_found = np.interp(time[first], found.time, found.force)
-    w_found = np.interp(time[first], found.time, found["history/plate_w"])
+    result = fecm.run_one(struck(32, row, float(time[first][-1])))
+    F_found = np.interp(time[first], result.time, result.force)
+    w_found = np.interp(time[first], result.time, result["history/plate_w"])
     assert np.abs(F_found - F[first]).max() < force * float(row["peak_N"])
     assert np.abs(w_found - w[first]).max() < 1e-3 * float(row["W_max_mm"])
 
@@ -604,9 +604,9 @@ def test_errors_of_the_linear_plate_are_said_to_be_those_without_preload() -> No
 
 def test_an_estimate_says_which_models_neglect_the_preload(tmp_path: Path) -> None:
     (tmp_path / "plate.inp").write_text(preloaded("-300."))
-    told = call("estimate", tmp_path / "plate.inp")
-    assert "preload     in the static plate and the run" in told.stdout
-    assert "compressive preload increases this error" in told.stderr
+    answer = call("estimate", tmp_path / "plate.inp")
+    assert "preload     in the static plate and the run" in answer.stdout
+    assert "compressive preload increases this error" in answer.stderr
 
 
 def test_cases_under_a_preload_equal_their_full_runs() -> None:
@@ -616,20 +616,20 @@ def test_cases_under_a_preload_equal_their_full_runs() -> None:
         {"velocity": 3000.0, "rod_mass": 2e-5},
         {"velocity": 2000.0, "rod_mass": 5e-5},
     ]
-    found = fecm.sweep(deck, cases=cases, history=True)
-    assert found.force is not None
-    assert found["status"].tolist() == ["ok"] * 3
-    for force, case in zip(found.force, cases, strict=True):
+    swept = fecm.sweep(deck, cases=cases, history=True)
+    assert swept.force is not None
+    assert swept["status"].tolist() == ["ok"] * 3
+    for force, case in zip(swept.force, cases, strict=True):
         result = fecm.run_one(apply_case(deck, case))
         assert np.abs(force[: len(result.force)] - result.force).max() < 1e-9 * result.force.max()
 
 
 def test_a_case_whose_plate_buckles_under_the_preload_says_so() -> None:
     deck = struck(4, summary_of("100g_biax_-0.5cr"), 1e-5)
-    found = fecm.sweep(deck, {"thickness": [2.69, 2.0], "dt": ["auto"]})
-    assert "buckling" not in found["status"][0]
-    assert "1.2" in found["status"][1]
-    assert "times the buckling load" in found["status"][1]
+    swept = fecm.sweep(deck, {"thickness": [2.69, 2.0], "dt": ["auto"]})
+    assert "buckling" not in swept["status"][0]
+    assert "1.2" in swept["status"][1]
+    assert "times the buckling load" in swept["status"][1]
 
 
 def series_compliance(force: float) -> float:

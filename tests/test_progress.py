@@ -124,8 +124,8 @@ def test_a_sweep_a_search_and_a_run_in_full_say_how_far_they_are(tmp_path: Path)
     assert re.findall(r"^fecm: (\d) of 2 done after 1 min", swept.stderr, re.M) == ["0", "2"]
     assert re.search(r"^fecm: case 1 is run in full, 1 min so far$", swept.stderr, re.M)
     find = ("--find", "velocity", "--until", "peak_force=1")
-    found = call("sweep", "d.inp", *find, "-o", "f.h5", cwd=tmp_path)
-    assert re.findall(r"^fecm: (\d) of 1 done after 1 min", found.stderr, re.M) == ["0", "1"]
+    answer = call("sweep", "d.inp", *find, "-o", "f.h5", cwd=tmp_path)
+    assert re.findall(r"^fecm: (\d) of 1 done after 1 min", answer.stderr, re.M) == ["0", "1"]
 
 
 @pytest.mark.usefixtures("_line_at_begin_and_end")
@@ -144,12 +144,12 @@ def test_a_fit_says_how_many_forces_it_has_computed(tmp_path: Path) -> None:
 def test_a_minute_has_passed_once_a_minute() -> None:
     now = 0.0
     due = once_a_minute(lambda: now)
-    told = []
+    values = []
     for second in range(0, 200, 25):
         now = float(second)
         if due():
-            told.append(second)
-    assert told == [75, 150]
+            values.append(second)
+    assert values == [75, 150]
 
 
 def test_the_log_of_a_library_call_gets_the_progress(

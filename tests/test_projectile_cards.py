@@ -254,8 +254,10 @@ def test_a_gage_reads_a_constant_strain_in_its_direction_and_depth(
     x, y = point
     deck = model(with_segment(f"GAGE\n7, {x}, {y}, 0.05, {direction}\n\n"))
     mesh = generate(deck)
-    made = gages(mesh, deck.require(fecm.deck.model.Gages).records)
-    strain = (made.weights * bent(mesh.coordinates).ravel()[made.dof_indices]).sum(axis=1)
+    gage_cards = gages(mesh, deck.require(fecm.deck.model.Gages).records)
+    strain = (gage_cards.weights * bent(mesh.coordinates).ravel()[gage_cards.dof_indices]).sum(
+        axis=1
+    )
     assert strain == pytest.approx([expected], rel=1e-12)
 
 

@@ -83,21 +83,21 @@ DOCSTRINGS = {
 def test_the_docstrings_of_public_functions_and_methods_are_numpys() -> None:
     validate = pytest.importorskip("numpydoc.validate").validate
     public = [getattr(fecm, name) for name in fecm.__all__]
-    found = [member for member in public if inspect.isfunction(member)]
+    values = [member for member in public if inspect.isfunction(member)]
     for kind in filter(inspect.isclass, public):
-        found += [
+        values += [
             f
             for name, f in vars(kind).items()
             if inspect.isfunction(f) and not name.startswith("_")
         ]
     wrong = {
         f.__qualname__: error
-        for f in found
+        for f in values
         for error in validate(f"{f.__module__}.{f.__qualname__}")["errors"]
         if error[0] in DOCSTRINGS
     }
     assert wrong == {}
-    assert len(found) > 20
+    assert len(values) > 20
 
 
 def test_importing_fecm_imports_neither_numpy_nor_scipy() -> None:
@@ -271,14 +271,14 @@ def test_the_deck_of_a_result_is_one_that_can_be_changed_and_run(tmp_path: Path)
 
 
 def test_a_deck_of_a_listing_result_is_read_as_the_original_program_reads_it(runs: Path) -> None:
-    found = fecm.load(runs / "listing.h5")
-    assert fecm.run_one(found.deck, mode="listing").force.tolist() == found.force.tolist()
+    result = fecm.load(runs / "listing.h5")
+    assert fecm.run_one(result.deck, mode="listing").force.tolist() == result.force.tolist()
 
 
 def test_a_result_without_a_readable_deck_says_so(runs: Path) -> None:
-    found = fecm.load(runs / "small.h5")
+    result = fecm.load(runs / "small.h5")
     for text in ("", "nonsense\n"):
-        other = fecm.Result({path: found[path] for path in found}, {"deck": text}, {})
+        other = fecm.Result({path: result[path] for path in result}, {"deck": text}, {})
         assert other.deck_text == text
         with pytest.raises(fecm.FecmError, match="no deck that can be read"):
             _ = other.deck
@@ -369,8 +369,8 @@ def test_units_are_asked_for_by_the_names_of_datasets_and_columns() -> None:
 
 def test_a_saved_sweep_is_the_file_that_the_sweep_would_have_written(tmp_path: Path) -> None:
     written, saved = tmp_path / "written.h5", tmp_path / "saved.h5"
-    found = fecm.sweep(small(), {"velocity": [50.0, 60.0]}, history=True, output=written)
-    found.save(saved)
+    swept = fecm.sweep(small(), {"velocity": [50.0, 60.0]}, history=True, output=written)
+    swept.save(saved)
     assert saved.read_bytes() == written.read_bytes()
     with pytest.raises(FileExistsError, match="exists already; overwrite=True replaces it"):
         fecm.load_sweep(saved).save(saved)

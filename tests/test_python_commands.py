@@ -101,12 +101,12 @@ def test_a_check_goes_to_another_process_and_back() -> None:
 
 def test_a_comparison_in_python_says_what_the_command_prints(runs: Path) -> None:
     a, b = runs / "report.h5", runs / "listing.h5"
-    found = fecm.diff(a, b)
-    assert f"{found}\n" == call("diff", a, b).stdout
-    told = json.loads(call("diff", a, b, "--format", "json").stdout)
-    assert told == jsonable(found.to_dict())
-    assert not found.same
-    (force,) = (one for one in found.datasets if one.name == "history/force")
+    difference = fecm.diff(a, b)
+    assert f"{difference}\n" == call("diff", a, b).stdout
+    document = json.loads(call("diff", a, b, "--format", "json").stdout)
+    assert document == jsonable(difference.to_dict())
+    assert not difference.same
+    (force,) = (one for one in difference.datasets if one.name == "history/force")
     # Peaks of the original program: 6.190 lb and 6.642 lb, both in step 10.
     assert force.values == pytest.approx((6.190, 6.642), abs=5e-4)
     assert force.at is not None
@@ -117,9 +117,9 @@ def test_a_comparison_in_python_says_what_the_command_prints(runs: Path) -> None
 def test_results_in_memory_compare_as_their_files(tmp_path: Path, runs: Path) -> None:
     result = fecm.run_one(small())
     for other in (runs / "small.h5", fecm.load(runs / "small.h5"), fecm.run_one(small())):
-        found = fecm.diff(result, other)
-        assert found.same
-        assert (found.listed, found.only_in_a, found.only_in_b) == ([], [], [])
+        difference = fecm.diff(result, other)
+        assert difference.same
+        assert (difference.listed, difference.only_in_a, difference.only_in_b) == ([], [], [])
     faster = fecm.run_one(small(data=DATA_CARDS.replace("     115.0", "     116.0")))
     faster.save(tmp_path / "faster.h5")
     in_memory = fecm.diff(result, faster)
@@ -133,9 +133,9 @@ def test_sweeps_compare_in_memory_too(tmp_path: Path) -> None:
     sweep.save(tmp_path / "sweep.h5")
     fecm.assert_same(sweep, tmp_path / "sweep.h5", rtol=None)
     other = fecm.sweep(small(), {"velocity": [50.0, 61.0]})
-    found = fecm.diff(sweep, other, only="cases")
-    assert found.different == ["cases/velocity"]
-    at = found.datasets[0].at
+    difference = fecm.diff(sweep, other, only="cases")
+    assert difference.different == ["cases/velocity"]
+    at = difference.datasets[0].at
     assert at is not None
     assert at.axes == {"case": 1}
     with pytest.raises(ValueError, match="a Deck is not a result"):
@@ -154,10 +154,10 @@ def test_tolerances_of_their_own_hold_in_the_order_of_the_mapping(runs: Path) ->
     assert fecm.diff(a, b, only=names, tol=wide).same
     narrow: dict[str, float | tuple[float, ...]] = {"history/force": (0.0, 0.5), "history": 1e-9}
     assert fecm.diff(a, b, only=names, tol=narrow).different == names
-    own = ["--tol", "history=1", "--tol", "history/force=0,.5"]
-    assert call("diff", a, b, "--only", "history/force", *own).exit_code == 0
+    values = ["--tol", "history=1", "--tol", "history/force=0,.5"]
+    assert call("diff", a, b, "--only", "history/force", *values).exit_code == 0
     again = ["--tol", "history=1e-9"]  # given last
-    assert call("diff", a, b, "--only", "history/force", *own, *again).exit_code == 1
+    assert call("diff", a, b, "--only", "history/force", *values, *again).exit_code == 1
 
 
 @pytest.mark.parametrize("wrong", [-1.0, float("nan"), float("inf"), "1e-6", (1e-6, 0.0, 0.0), ()])
@@ -194,8 +194,8 @@ def test_a_result_that_is_not_the_trusted_one_fails_with_the_lines_about_the_dif
 
 def test_verification_in_python_has_the_rows_of_the_command() -> None:
     rows = fecm.verify("isotropic-ply", "wave-fronts")
-    told = json.loads(call("verify", "isotropic-ply", "wave-fronts", "--format", "json").stdout)
-    assert [row.to_dict() for row in rows] == told["rows"]
+    document = json.loads(call("verify", "isotropic-ply", "wave-fronts", "--format", "json").stdout)
+    assert [row.to_dict() for row in rows] == document["rows"]
     assert all(row.within for row in rows)
     # E h / (1 - nu^2) of the ply of the case.
     assert rows[0].got == pytest.approx(1e6 * 1.0 / (1.0 - 0.3**2), rel=1e-12)
@@ -216,9 +216,9 @@ def test_an_export_in_python_is_the_file_of_the_command(runs: Path, tmp_path: Pa
         result.export(tmp_path / name, *arguments)
         asked = [word for one in arguments for word in ("--dataset", one)]
         to = name.partition(".")[2]
-        own = tmp_path / f"command-{name}"
-        assert call("export", runs / "small.h5", "--to", to, *asked, "-o", own).exit_code == 0
-        assert own.read_bytes() == (tmp_path / name).read_bytes()
+        value = tmp_path / f"command-{name}"
+        assert call("export", runs / "small.h5", "--to", to, *asked, "-o", value).exit_code == 0
+        assert value.read_bytes() == (tmp_path / name).read_bytes()
 
 
 def test_exports_that_can_not_be_meant_are_refused_and_files_are_kept(

@@ -144,8 +144,8 @@ def test_a_table_of_cases_keeps_the_index_of_the_caller() -> None:
     pandas = pytest.importorskip("pandas")
     tests = pandas.DataFrame({"name": ["A", "B", "C"], "velocity": [50.0, 75.0, 100.0]})
     tests = tests.sort_values("velocity", ascending=False)
-    found = fecm.sweep(DECK, cases=tests[["velocity"]])
-    table = found.to_dataframe()
+    swept = fecm.sweep(DECK, cases=tests[["velocity"]])
+    table = swept.to_dataframe()
     assert table.index.equals(tests.index)
     joined = tests.assign(at=table["velocity"], force=table["peak_force"])
     assert joined["at"].tolist() == joined["velocity"].tolist() == [100.0, 75.0, 50.0]
@@ -239,8 +239,8 @@ def test_forces_of_a_sweep_have_times_where_all_cases_have_one_time_step() -> No
 
 def test_statistics_without_varied_values_are_numbers(tmp_path: Path) -> None:
     laws = {"k": "normal:2e6,1e5"}
-    found = fecm.sweep(DECK, random=laws, samples=16, output=tmp_path / "s.h5")
-    for result in (found, fecm.load_sweep(tmp_path / "s.h5")):
+    swept = fecm.sweep(DECK, random=laws, samples=16, output=tmp_path / "s.h5")
+    for result in (swept, fecm.load_sweep(tmp_path / "s.h5")):
         assert result.random is not None
         statistics = result.random.statistics["impulse"]
         assert np.isscalar(statistics.mean)

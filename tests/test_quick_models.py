@@ -122,22 +122,22 @@ def test_an_unsymmetric_laminate_is_softer_than_its_d() -> None:
 def test_the_infinite_plate_is_zeners(row: dict[str, str]) -> None:
     mass, velocity, k = 0.3, 2.0, 5e5
     scale = (mass / (k * velocity**0.5)) ** 0.4
-    found = infinite_plate(mass, velocity, k, float(row["lambda"]))
+    closed_form = infinite_plate(mass, velocity, k, float(row["lambda"]))
     peak = float(row["F_max/(M V/T) = F_max/(k^.4 V^1.2 M^.6)"]) * mass * velocity / scale
-    assert found.peak == pytest.approx(peak, rel=1e-7)
-    assert found.time == pytest.approx(float(row["t_peak/T"]) * scale, rel=1e-7)
-    assert found.duration == pytest.approx(float(row["t_contact/T"]) * scale, rel=1e-7)
+    assert closed_form.peak == pytest.approx(peak, rel=1e-7)
+    assert closed_form.time == pytest.approx(float(row["t_peak/T"]) * scale, rel=1e-7)
+    assert closed_form.duration == pytest.approx(float(row["t_contact/T"]) * scale, rel=1e-7)
 
 
 def test_without_damping_the_contact_is_that_of_hertz() -> None:
     mass, velocity, k = 0.3, 2.0, 5e5
-    found = infinite_plate(mass, velocity, k, 0.0)
+    closed_form = infinite_plate(mass, velocity, k, 0.0)
     # M V^2/2 = 2/5 k a^2.5, and the duration 2 a/V times the integral of dx/sqrt(1 - x^2.5).
     depth = (1.25 * mass * velocity**2 / k) ** 0.4
     integral = 0.4 * beta(0.4, 0.5)
-    assert found.peak == pytest.approx(k * depth**1.5, rel=1e-12)
-    assert found.time == pytest.approx(integral * depth / velocity, rel=1e-12)
-    assert found.duration == pytest.approx(2.0 * found.time, rel=1e-12)
+    assert closed_form.peak == pytest.approx(k * depth**1.5, rel=1e-12)
+    assert closed_form.time == pytest.approx(integral * depth / velocity, rel=1e-12)
+    assert closed_form.duration == pytest.approx(2.0 * closed_form.time, rel=1e-12)
 
 
 def test_a_contact_without_an_end_in_sight_lasts_for_ever(
@@ -198,7 +198,7 @@ def test_zeners_parameter_classifies_the_reference_plates() -> None:
 def test_the_static_stiffness_of_thin_plates_is_timoshenkos(row: dict[str, str]) -> None:
     ratio = row["plate"].partition("b/a=")[2].partition(" ")[0] or "1"
     support = "clamped" if "clamped" in row["plate"] else "simple"
-    made = call(
+    answer = call(
         "new",
         "-",
         "--size",
@@ -228,7 +228,7 @@ def test_the_static_stiffness_of_thin_plates_is_timoshenkos(row: dict[str, str])
         "--duration",
         "1e-3",
     )
-    (problem,) = load_deck(made.stdout).problems
+    (problem,) = load_deck(answer.stdout).problems
     assert problem.contact is not None
     rigidity = 0.005**3 / (12.0 * (1.0 - 0.3**2))
     compliance = rigidity / static_stiffness(problem.moving_plate, problem.contact)
@@ -253,11 +253,11 @@ def with_threshold(card: str) -> str:
 
 def test_a_run_stores_the_threshold_and_its_first_crossing(tmp_path: Path) -> None:
     plain = run_one(small().replace("EXPE", "PATC\nDISC,.2\nEXPE"))
-    found = run_one(with_threshold("1.0E-3,"))
-    np.testing.assert_array_equal(found.force, plain.force)
-    values = found.threshold
-    above = found.time[found.force >= values["force"]]
-    assert 0 < len(above) < len(found.time)
+    result = run_one(with_threshold("1.0E-3,"))
+    np.testing.assert_array_equal(result.force, plain.force)
+    values = result.threshold
+    above = result.time[result.force >= values["force"]]
+    assert 0 < len(above) < len(result.time)
     assert values["time"] == above[0]
     assert np.isnan(values["margin"])  # the run ends before its peak
     assert values["force"] == pytest.approx(threshold_force(values["d_star"], 1.0e-3), rel=1e-12)
@@ -275,11 +275,11 @@ def test_toughness_and_number_of_delaminations_are_checked(card: str) -> None:
 
 
 def test_the_threshold_is_printed_with_the_number_of_delaminations_it_assumes() -> None:
-    found = run_one(with_threshold("1.0E-3,7."))
-    values = found.threshold
+    result = run_one(with_threshold("1.0E-3,7."))
+    values = result.threshold
     assert (values["number"], values["interfaces"]) == (7, 1)
     assert list(values["band"]) == pytest.approx([values["force"] * math.sqrt(3.0)] * 2, rel=1e-12)
-    (line,) = [line for line in run_summary(found) if line.startswith("delamination")]
+    (line,) = [line for line in run_summary(result) if line.startswith("delamination")]
     assert line.endswith(f"(for 7 delaminations, as in DELA; {values['band'][1]:.4g} for one)")
 
 
@@ -306,7 +306,7 @@ def test_a_laminate_whose_bending_twists_it_is_named_beside_its_threshold(
 ) -> None:
     ply = "1.6e-9,.3,141e3,9.75e3,5.2e3,5.2e3,3.2e3"
     layup = "[" + "/".join(f"{angle:g}" for angle in angles) + "]"
-    made = call(
+    answer = call(
         "new",
         "-",
         "--size",
@@ -330,7 +330,7 @@ def test_a_laminate_whose_bending_twists_it_is_named_beside_its_threshold(
         "--patch",
         "none",
     )
-    deck = load_deck(made.stdout.replace("EXPE", "DELA\n0.5\nEXPE"))
+    deck = load_deck(answer.stdout.replace("EXPE", "DELA\n0.5\nEXPE"))
     assert ("W461" in [finding.code for finding in deck.findings]) is warns
 
 

@@ -138,16 +138,16 @@ def test_an_object_with_quantiles_is_a_law(tmp_path: Path) -> None:
         "velocity": Measured(),
     }
     text = {**random, "k": "weibull:2e6,5"}
-    found = fecm.sweep(small(), random=random, samples=16, output=tmp_path / "s.h5")
+    swept = fecm.sweep(small(), random=random, samples=16, output=tmp_path / "s.h5")
     same = fecm.sweep(small(), random=text, samples=16)
-    np.testing.assert_allclose(found["k"], same["k"], rtol=1e-12)
-    assert np.median(found["velocity"]) == pytest.approx(99.0, abs=1.0)
-    assert found.random is not None
-    assert str(found.random.design.laws["k"]) == "weibull_min(5, scale=2000000.0)"
-    assert str(found.random.design.laws["velocity"]) == "Measured"
+    np.testing.assert_allclose(swept["k"], same["k"], rtol=1e-12)
+    assert np.median(swept["velocity"]) == pytest.approx(99.0, abs=1.0)
+    assert swept.random is not None
+    assert str(swept.random.design.laws["k"]) == "weibull_min(5, scale=2000000.0)"
+    assert str(swept.random.design.laws["velocity"]) == "Measured"
     loaded = fecm.load_sweep(tmp_path / "s.h5").random
     assert loaded is not None
-    assert loaded.design == found.random.design == pickle.loads(pickle.dumps(found)).random.design
+    assert loaded.design == swept.random.design == pickle.loads(pickle.dumps(swept)).random.design
     with pytest.raises(CasesError, match=r"the draws of weibull_min.*, not the law"):
         matrix(loaded.design)
 
@@ -165,8 +165,8 @@ def test_a_new_distribution_of_scipy_is_a_law() -> None:
         laws.append(stats.Normal(mu=2e6, sigma=1e5))
     wanted = fecm.sweep(small(), random={"k": "normal:2e6,1e5"}, samples=16)
     for law in laws:
-        found = fecm.sweep(small(), random={"k": law}, samples=16)
-        np.testing.assert_allclose(found["k"], wanted["k"], rtol=1e-12)
+        swept = fecm.sweep(small(), random={"k": law}, samples=16)
+        np.testing.assert_allclose(swept["k"], wanted["k"], rtol=1e-12)
 
 
 def test_a_distribution_without_parameters_is_refused() -> None:

@@ -231,13 +231,13 @@ def test_the_interval_of_a_probability_is_wilsons() -> None:
 
 def test_random_masses_hit_as_in_their_own_runs() -> None:
     values = [1.5e-4, 1.8e-4, 2.4e-4]
-    found = fecm.sweep(fecm.read_one(HERTZ), {"rod_mass": values})
-    for mass, peak in zip(values, found["peak_force"], strict=True):
+    swept = fecm.sweep(fecm.read_one(HERTZ), {"rod_mass": values})
+    for mass, peak in zip(values, swept["peak_force"], strict=True):
         assert peak == pytest.approx(1912000**0.4 * (1.25 * mass * 115.0**2) ** 0.6, rel=4e-5)
     plate = fecm.read_one(small(data=f"PROJ\n0,0,2e-4\n{DATA_CARDS}"))
-    found = fecm.sweep(plate, {"rod_mass": values}, history=True)
-    assert found.force is not None
-    for mass, force in zip(values, found.force, strict=True):
+    swept = fecm.sweep(plate, {"rod_mass": values}, history=True)
+    assert swept.force is not None
+    for mass, force in zip(values, swept.force, strict=True):
         own = fecm.run_one(plate.with_(rod_mass=mass)).force
         np.testing.assert_allclose(force, own, rtol=1e-12)
 
@@ -247,13 +247,13 @@ def check_hertz(found: fecm.SweepResult) -> None:
     random = found.random
     assert random is not None
     assert_inside(random.sensitivity["peak_force"], exact_indices())
-    made = random.statistics["peak_force"]
+    peak_force = random.statistics["peak_force"]
     moments, limits, quantiles = tables()[1:]
-    error = float(moments[0]["standard deviation"]) / np.sqrt(made.draws)
-    assert made.mean == pytest.approx(float(moments[0]["mean"]), abs=2.0 * float(error))
-    for row, q, value in zip(quantiles, QUANTILES, made.quantiles, strict=True):
+    error = float(moments[0]["standard deviation"]) / np.sqrt(peak_force.draws)
+    assert peak_force.mean == pytest.approx(float(moments[0]["mean"]), abs=2.0 * float(error))
+    for row, q, value in zip(quantiles, QUANTILES, peak_force.quantiles, strict=True):
         assert float(row["quantile"]) == q
-        spread = float(moments[0]["standard deviation"]) * np.sqrt(q * (1.0 - q) / made.draws)
+        spread = float(moments[0]["standard deviation"]) * np.sqrt(q * (1.0 - q) / peak_force.draws)
         density = max(0.05, 4.0 * q * (1.0 - q) * 0.4)  # at least that of a normal law, times SD
         assert value == pytest.approx(float(row["F"]), abs=2.0 * float(spread) / density)
     exact = {float(row["threshold lb"]): float(row["P(F > threshold)"]) for row in limits}
@@ -302,12 +302,12 @@ def test_the_same_seed_gives_the_same_bytes(folder: Path) -> None:
 
 def test_the_cases_of_a_design_identify_an_interrupted_sweep() -> None:
     problem = load_deck(fecm.read_one(small())).problems[0]
-    made = {
+    by_name = {
         seed: plan(problem, random_cases(design, [{}]), design=design).fingerprint()
         for seed in (0, 1)
         for design in [Design({"k": ValueDistribution("uniform", (1e6, 2e6))}, 16, seed)]
     }
-    assert made[0] != made[1]
+    assert by_name[0] != by_name[1]
 
 
 def test_a_file_gives_back_the_results_of_the_sweep(folder: Path) -> None:
@@ -335,18 +335,18 @@ def test_the_statistics_are_those_of_the_draws(folder: Path) -> None:
     loaded = fecm.load_sweep(folder / "one.h5")
     assert loaded.random is not None
     force = loaded["peak_force"][:64]  # 128 cases, of which A and B are independent
-    made = loaded.random.statistics["peak_force"]
-    assert made.draws == 64
-    assert made.mean == force.mean()
-    assert made.standard_deviation == pytest.approx(force.std(ddof=1), rel=1e-12)
-    np.testing.assert_array_equal(made.quantiles, np.quantile(force, QUANTILES))
+    peak_force = loaded.random.statistics["peak_force"]
+    assert peak_force.draws == 64
+    assert peak_force.mean == force.mean()
+    assert peak_force.standard_deviation == pytest.approx(force.std(ddof=1), rel=1e-12)
+    np.testing.assert_array_equal(peak_force.quantiles, np.quantile(force, QUANTILES))
     assert loaded.random.exceedance.probability == [(force > 600.0).mean()]
 
 
 def test_info_diff_and_export_read_the_file(folder: Path) -> None:
-    told = call("info", "one.h5", cwd=folder).stdout
-    assert "  design            lhs, 32 samples, seed 0\n" in told
-    assert "  law = uniform\n  parameters = [1e+06, 3e+06]\n" in told
+    stdout = call("info", "one.h5", cwd=folder).stdout
+    assert "  design            lhs, 32 samples, seed 0\n" in stdout
+    assert "  law = uniform\n  parameters = [1e+06, 3e+06]\n" in stdout
     assert call("diff", "one.h5", "one.h5", cwd=folder).exit_code == 0
     done = call("export", "one.h5", "--to", "csv", "-o", "-", cwd=folder)
     assert done.stdout.startswith("case,k,velocity,peak_force,")
@@ -363,7 +363,7 @@ def test_the_axes_of_the_file_are_named(folder: Path) -> None:
 
 def test_every_combination_of_varied_values_gets_the_same_draws(folder: Path) -> None:
     random = {"k": "normal:1.9e6,1e5"}
-    found = fecm.sweep(
+    swept = fecm.sweep(
         folder / "small.inp",
         {"velocity": [50.0, 115.0]},
         random=random,
@@ -371,13 +371,13 @@ def test_every_combination_of_varied_values_gets_the_same_draws(folder: Path) ->
         exceed={"peak_force": [500.0, 600.0]},
         output=folder / "two.h5",
     )
-    np.testing.assert_array_equal(found["k"][:16], found["k"][16:])
-    np.testing.assert_array_equal(found["velocity"], np.repeat([50.0, 115.0], 16))
-    assert found.random is not None
-    force = found["peak_force"].reshape(2, 16)
-    np.testing.assert_array_equal(found.random.statistics["peak_force"].mean, force.mean(axis=1))
+    np.testing.assert_array_equal(swept["k"][:16], swept["k"][16:])
+    np.testing.assert_array_equal(swept["velocity"], np.repeat([50.0, 115.0], 16))
+    assert swept.random is not None
+    force = swept["peak_force"].reshape(2, 16)
+    np.testing.assert_array_equal(swept.random.statistics["peak_force"].mean, force.mean(axis=1))
     exceeded = np.column_stack([(force > limit).mean(axis=1) for limit in (500.0, 600.0)])
-    np.testing.assert_array_equal(found.random.exceedance.probability, exceeded)
+    np.testing.assert_array_equal(swept.random.exceedance.probability, exceeded)
     loaded = fecm.load_sweep(folder / "two.h5").random
     assert loaded is not None
     assert loaded.label(1) == "velocity 115.0"
@@ -387,12 +387,12 @@ def test_a_threshold_of_the_deck_is_a_limit(folder: Path) -> None:
     (folder / "dela.inp").write_text(QUICK.replace("EXPE", "DELA\n1.\nEXPE"))
     options = ("--random", "velocity=uniform:20,115", "--samples", 64, "--exceed")
     call("sweep", "dela.inp", *options, "peak_force=threshold", "-o", "dela.h5", cwd=folder)
-    found = fecm.load_sweep(folder / "dela.h5")
-    assert found.random is not None
-    above = found["peak_force"] > found["threshold_force"]
+    swept = fecm.load_sweep(folder / "dela.h5")
+    assert swept.random is not None
+    above = swept["peak_force"] > swept["threshold_force"]
     assert 0.0 < above.mean() < 1.0
-    assert found.random.exceedance.probability == [above.mean()]
-    assert found.random.exceedance.limit == found["threshold_force"][:1]
+    assert swept.random.exceedance.probability == [above.mean()]
+    assert swept.random.exceedance.limit == swept["threshold_force"][:1]
 
 
 def test_impossible_draws_are_failed_cases_and_their_share_is_told(folder: Path) -> None:

@@ -92,31 +92,31 @@ def test_the_energy_is_that_of_the_elements_with_the_membrane_in_equilibrium(
     plate = plate if lam.is_coupled else replace(plate, preload=(1e-5, -2e-6, 3e-6))
     contact = patch_on(plate, 0.6, 0.45)
     shapes = bending_modes(plate, contact, 5).shapes
-    made = reduced_plate(plate, contact, 5)
+    reduced = reduced_plate(plate, contact, 5)
     q = np.array([0.7, -0.4, 0.3, 0.2, -0.1])
     field = plate.field(shapes @ q, 0.0)
     largest = np.abs(field[:, 2]).max()
     q, field = q * lam.thickness / largest, field * lam.thickness / largest
     first, second = np.triu_indices(5)
-    membrane = -(made.cubic[5:] @ (q[first] * q[second])) / made.stiffness[5:]
-    energy = made.strain_energy(np.append(q, membrane)[:, None])
-    assert made.bending == 5
+    membrane = -(reduced.cubic[5:] @ (q[first] * q[second])) / reduced.stiffness[5:]
+    energy = reduced.strain_energy(np.append(q, membrane)[:, None])
+    assert reduced.bending == 5
     assert energy[0] == pytest.approx(relaxed_energy(plate, field), rel=1e-11)
-    linear = 0.5 * float((made.stiffness[:5] * q * q).sum())
+    linear = 0.5 * float((reduced.stiffness[:5] * q * q).sum())
     assert energy[0] > 1.04 * linear  # the plate does stretch
 
 
 def test_internal_forces_are_the_gradient_of_the_energy() -> None:
     plate = on_square(general_plate(), held=False)
-    made = reduced_plate(plate, patch_on(plate), 4)
-    n = len(made.stiffness)
-    assert n > made.bending  # membrane modes too
+    reduced = reduced_plate(plate, patch_on(plate), 4)
+    n = len(reduced.stiffness)
+    assert n > reduced.bending  # membrane modes too
     q = 0.1 * np.cos(np.arange(n) + 1.0)[:, None]
     step = 1e-5
     moved = q + step * np.hstack([np.eye(n), -np.eye(n)])
-    energy = made.strain_energy(moved)
+    energy = reduced.strain_energy(moved)
     slope = (energy[:n] - energy[n:]) / (2.0 * step)
-    exact = made.internal_forces(q)[:, 0]
+    exact = reduced.internal_forces(q)[:, 0]
     assert np.abs(slope - exact).max() < 1e-7 * np.abs(exact).max()
 
 
@@ -155,16 +155,16 @@ def test_modes_of_equal_frequency_are_the_one_that_moves() -> None:
 
 def test_all_modes_leave_no_compliance_to_the_contact() -> None:
     plate = on_square(isotropic_plate(THICKNESS), held=True, n=2)
-    made = reduced_plate(plate, patch_on(plate), 100)
-    assert made.bending < 100
-    assert made.flexibility < 1e-8 / static_stiffness(plate, patch_on(plate))
+    reduced = reduced_plate(plate, patch_on(plate), 100)
+    assert reduced.bending < 100
+    assert reduced.flexibility < 1e-8 / static_stiffness(plate, patch_on(plate))
 
 
 def test_few_modes_and_the_spring_have_the_static_stiffness_of_the_plate() -> None:
     plate = on_square(isotropic_plate(THICKNESS), held=True)
-    made = reduced_plate(plate, patch_on(plate), 3)
-    compliance = (made.deflection**2 / made.stiffness).sum() + made.flexibility
-    assert made.flexibility > 0.005 * compliance
+    reduced = reduced_plate(plate, patch_on(plate), 3)
+    compliance = (reduced.deflection**2 / reduced.stiffness).sum() + reduced.flexibility
+    assert reduced.flexibility > 0.005 * compliance
     assert 1.0 / compliance == pytest.approx(static_stiffness(plate, patch_on(plate)), rel=1e-10)
 
 
@@ -196,9 +196,9 @@ def test_a_linear_mode_under_a_constant_force_is_exact_at_any_step() -> None:
     dt = 1.3
     motion = ReducedMotion(one_mode(), dt, 1)
     # Central differences from rest: half of the force in the first step.
-    found = [motion.advance(np.array([0.5 if step == 0 else 1.0]))[0] for step in range(20)]
+    values = [motion.advance(np.array([0.5 if step == 0 else 1.0]))[0] for step in range(20)]
     exact = 1.0 - np.cos(dt * np.arange(1, 21))
-    assert np.abs(found - exact).max() < 1e-12
+    assert np.abs(values - exact).max() < 1e-12
 
 
 def test_the_period_of_a_duffing_oscillator_is_that_of_jacobi() -> None:
@@ -235,13 +235,13 @@ def test_free_vibration_keeps_its_energy_with_that_of_the_damping(damping: float
 
 def test_no_case_depends_on_the_others() -> None:
     plate = on_square(isotropic_plate(THICKNESS), held=True, n=2)
-    made = reduced_plate(plate, patch_on(plate), 4)
+    reduced = reduced_plate(plate, patch_on(plate), 4)
     forces = np.linspace(1e-6, 1e-4, 70)
-    dt = 0.2 / made.fastest
-    together, alone = ReducedMotion(made, dt, 70), ReducedMotion(made, dt, 1)
+    dt = 0.2 / reduced.fastest
+    together, alone = ReducedMotion(reduced, dt, 70), ReducedMotion(reduced, dt, 1)
     w = [together.advance(forces)[41] for _ in range(30)]
-    own = [alone.advance(forces[41:42])[0] for _ in range(30)]
-    assert w == own
+    values = [alone.advance(forces[41:42])[0] for _ in range(30)]
+    assert w == values
 
 
 # Contact in series -------------------------------------------------------------------------------
@@ -255,11 +255,11 @@ def test_a_law_in_series_with_a_spring_has_the_sum_of_their_displacements() -> N
     memory, last = law.start(), ContactPoint(0.0 * cases, 0.0 * cases)
     depths = np.concatenate([np.linspace(0.05, 1.0, 20), np.linspace(0.95, 0.3, 14), [0.8, 1.4]])
     for depth in depths:
-        own = depth * np.array([1.0, 0.5, -1.0])
-        force, memory = law.trial(memory, last, own)
-        point = ContactPoint(own, force)
+        value = depth * np.array([1.0, 0.5, -1.0])
+        force, memory = law.trial(memory, last, value)
+        point = ContactPoint(value, force)
         memory_of_law = memory
-        memory = law.accept(memory, last, own)
+        memory = law.accept(memory, last, value)
         again, _ = inner.trial(memory_of_law, law.of_law(last), law.of_law(point).indentation)
         assert force == pytest.approx(again, rel=1e-6, abs=1e-12)
         last = point

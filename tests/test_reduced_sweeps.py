@@ -76,18 +76,18 @@ def test_impacts_up_to_twice_the_thickness_are_those_of_a_spectral_program(case:
     }
     # The largest deflection is open until the plate can't reach the projectile any more.
     deck = struck_rectangle(case, 16, 1.0, 1.3 * float(wanted["contact_end_s"].max()))
-    found = fecm.sweep(
+    sweep_result = fecm.sweep(
         deck,
         {"velocity": wanted["velocity_mm_per_s"].tolist()},
         model="reduced",
         measure="max_deflection",
     )
-    np.testing.assert_allclose(found["peak_force"], wanted["peak_N"], rtol=1e-2)
-    np.testing.assert_allclose(found["max_deflection"], wanted["W_max_mm"], rtol=1e-3)
-    np.testing.assert_allclose(found["last_contact"], wanted["contact_end_s"], rtol=1e-2)
-    assert found.reduced is not None
-    assert np.abs(found.reduced.difference("peak_force")).max() < 1e-2
-    assert np.abs(found.reduced.difference(RATIO)).max() < 1e-3
+    np.testing.assert_allclose(sweep_result["peak_force"], wanted["peak_N"], rtol=1e-2)
+    np.testing.assert_allclose(sweep_result["max_deflection"], wanted["W_max_mm"], rtol=1e-3)
+    np.testing.assert_allclose(sweep_result["last_contact"], wanted["contact_end_s"], rtol=1e-2)
+    assert sweep_result.reduced is not None
+    assert np.abs(sweep_result.reduced.difference("peak_force")).max() < 1e-2
+    assert np.abs(sweep_result.reduced.difference(RATIO)).max() < 1e-3
 
 
 @pytest.mark.long
@@ -121,11 +121,11 @@ def test_three_full_runs_are_stored_beside_the_cases_and_shown(
 
 def test_too_few_modes_are_refused_before_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
     ran: list[Task] = []
-    own = execute._outcomes
+    _outcomes = execute._outcomes
 
     def counted(*given: Any) -> Any:
         ran.extend(given[-2])
-        return own(*given)
+        return _outcomes(*given)
 
     monkeypatch.setattr(execute, "_outcomes", counted)
     with pytest.raises(CasesError, match=r"1 mode differs by \+.* case 3; .*2%.*more modes"):
@@ -191,7 +191,7 @@ def test_a_case_does_not_depend_on_the_others(swept: fecm.SweepResult) -> None:
 
 @pytest.mark.long
 def test_random_values_are_by_the_model_too() -> None:
-    found = fecm.sweep(
+    sweep_result = fecm.sweep(
         DECK,
         random={"k": "uniform:4e4,6e4"},
         samples=16,
@@ -199,11 +199,11 @@ def test_random_values_are_by_the_model_too() -> None:
         model="reduced",
         modes=ENOUGH,
     )
-    assert found.random is not None
-    assert found.reduced is not None
-    assert found.reduced.columns["case"].shape == (3,)
-    assert found.random.statistics["peak_force"].draws == 16
-    assert 150.0 < found["peak_force"].min() < found["peak_force"].max() < 210.0
+    assert sweep_result.random is not None
+    assert sweep_result.reduced is not None
+    assert sweep_result.reduced.columns["case"].shape == (3,)
+    assert sweep_result.random.statistics["peak_force"].draws == 16
+    assert 150.0 < sweep_result["peak_force"].min() < sweep_result["peak_force"].max() < 210.0
 
 
 def test_an_elastic_rod_hits_the_reduced_plate_as_the_full_one() -> None:
@@ -224,10 +224,10 @@ def test_cases_of_many_velocities_are_few_tasks() -> None:
 
 def test_a_rod_takes_a_step_in_which_a_wave_crosses_one_element_at_most() -> None:
     (problem,) = load_deck(text(PROGRAM, data=ROD)).problems
-    made = reduced(problem, 1)
-    (times,) = by_halvings(made, impacts_from_cards({0: strike_of(problem.deck)}))
+    reduced_model = reduced(problem, 1)
+    (times,) = by_halvings(reduced_model, impacts_from_cards({0: strike_of(problem.deck)}))
     assert times > 0
-    assert made.halved(times).dt <= 0.5 / 4 * (2e-4 / 1e7) ** 0.5
+    assert reduced_model.halved(times).dt <= 0.5 / 4 * (2e-4 / 1e7) ** 0.5
 
 
 @pytest.mark.long
@@ -250,15 +250,17 @@ def test_the_compliance_left_out_is_in_series_with_the_contact() -> None:
 
 def test_a_stiff_contact_halves_the_time_step_of_its_cases() -> None:
     (problem,) = load_deck(DECK).problems
-    made = reduced(problem, 3)
+    reduced_model = reduced(problem, 3)
     soft = strike_of(problem.deck)
     stiff = soft.with_constant("k", 1e4 * soft.law.k)
-    groups = by_halvings(made, impacts_from_cards({0: soft, 1: stiff, 2: soft}))
+    groups = by_halvings(reduced_model, impacts_from_cards({0: soft, 1: stiff, 2: soft}))
     times = {number: n for n, group in groups.items() for number in group}
     assert times[0] == times[2] < times[1]
-    halved = made.halved(times[1])
-    assert halved.dt * halved.steps == pytest.approx(made.dt * made.steps, rel=1e-14)
-    assert made.dt * made.steps == pytest.approx(STEPS * 4e-7, rel=1e-12)
+    halved = reduced_model.halved(times[1])
+    assert halved.dt * halved.steps == pytest.approx(
+        reduced_model.dt * reduced_model.steps, rel=1e-14
+    )
+    assert reduced_model.dt * reduced_model.steps == pytest.approx(STEPS * 4e-7, rel=1e-12)
 
 
 NOT_GIVEN: list[tuple[str, dict[str, Any], str]] = [

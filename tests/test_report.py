@@ -137,12 +137,12 @@ def test_exposures_of_a_page_are_those_of_the_result(failed: Result, shown: Page
 
 @pytest.mark.usefixtures("_unrendered")
 def test_what_a_run_lacks_has_no_heading() -> None:
-    found = page(small=fecm.run_one(small()))
+    report_page = page(small=fecm.run_one(small()))
     of_trust = ["Trust", "Notes of the run", "Warnings about the deck"]
-    assert found.headings[1:] == [*of_trust, "Results", "Pictures", "Model", "Provenance"]
+    assert report_page.headings[1:] == [*of_trust, "Results", "Pictures", "Model", "Provenance"]
     absent = {"Delamination threshold", "Largest exposures", "Ply strengths"}
-    assert not absent & set(found.captions)
-    assert "not judged" in found.text
+    assert not absent & set(report_page.captions)
+    assert "not judged" in report_page.text
 
 
 @pytest.mark.usefixtures("_undrawn")
@@ -151,58 +151,58 @@ def test_a_run_without_impact_has_a_page() -> None:
     held = "   24    0    1    1    0    0    0\n   25    0    1    1    1    1    1\n"
     deck = small("DT         1.0\nTANG\nTIME\nFORM\nSOLV\nDISP\n").replace("ROD", forces, 1)
     deck = deck.replace("   25    0    1    1    0    0    0\n", held, 1)
-    found = page(small=fecm.run_one(deck))
-    assert "No impact: see Results." in found.text
-    assert "Summary" in found.captions
-    assert "at node" in found.row("largest w")[0].text
+    report_page = page(small=fecm.run_one(deck))
+    assert "No impact: see Results." in report_page.text
+    assert "Summary" in report_page.captions
+    assert "at node" in report_page.row("largest w")[0].text
 
 
 @pytest.mark.usefixtures("_undrawn")
 def test_an_open_peak_is_a_lower_bound() -> None:
     result = fecm.run_one(small())
-    found = page(small=result)
-    assert found.row("largest force by the end")[0].value == result.force.max()
-    assert found.row("end of the run")[1].text == "outside the model"
-    assert found.row("peak force")[0].text == "–"
+    report_page = page(small=result)
+    assert report_page.row("largest force by the end")[0].value == result.force.max()
+    assert report_page.row("end of the run")[1].text == "outside the model"
+    assert report_page.row("peak force")[0].text == "–"
 
 
 @pytest.mark.usefixtures("_undrawn")
 def test_a_projectile_and_a_law_of_the_user_stand_for_those_of_the_deck() -> None:
     heavy = fecm.RigidMass(3e-3)
     result = fecm.run_one(small(), projectile=heavy, law=Dented())
-    found = page(small=result)
-    assert "RigidMass, instead of PROJ" in found.row("projectile")[0].text
-    assert found.row("contact law")[0].text == "Dented, instead of EXPE"
-    assert found.row("mass")[0].value is not None
-    masses = [row[1].value for row in found.rows if row[0].text == "mass"]
+    report_page = page(small=result)
+    assert "RigidMass, instead of PROJ" in report_page.row("projectile")[0].text
+    assert report_page.row("contact law")[0].text == "Dented, instead of EXPE"
+    assert report_page.row("mass")[0].value is not None
+    masses = [row[1].value for row in report_page.rows if row[0].text == "mass"]
     assert masses[-1] == pytest.approx(3e-3, rel=1e-12)
-    assert "A mass of 0.003 at 115 (19.84)" in found.text
+    assert "A mass of 0.003 at 115 (19.84)" in report_page.text
 
 
 @pytest.mark.usefixtures("_undrawn")
 def test_the_energy_of_a_run_with_slips_is_that_of_its_own_projectile() -> None:
     result = fecm.run_one(small(), mode="listing")
-    found = page(small=result)
+    report_page = page(small=result)
     initial = result.attributes_of("energy")["initial"]
-    assert found.row("energy")[0].value == pytest.approx(initial, rel=1e-12)
+    assert report_page.row("energy")[0].value == pytest.approx(initial, rel=1e-12)
 
 
 @pytest.mark.usefixtures("_undrawn")
 def test_the_constants_of_the_law_have_units_and_the_deck_its_warnings() -> None:
-    found = page(small=fecm.run_one(small().replace("ROD", "UNIT\nin lbf s\nROD", 1)))
-    assert found.row("contact coefficient k")[0].text == "1.912e+06 lbf/in^1.5"
-    assert found.row("critical indentation alpha_p")[0].text == "0.0006564 in"
-    assert "Warnings about the deck" in found.headings
-    assert "[W415]" in found.text
+    report_page = page(small=fecm.run_one(small().replace("ROD", "UNIT\nin lbf s\nROD", 1)))
+    assert report_page.row("contact coefficient k")[0].text == "1.912e+06 lbf/in^1.5"
+    assert report_page.row("critical indentation alpha_p")[0].text == "0.0006564 in"
+    assert "Warnings about the deck" in report_page.headings
+    assert "[W415]" in report_page.text
 
 
 @pytest.mark.usefixtures("_undrawn")
 def test_a_result_without_a_readable_deck_has_a_page() -> None:
     result = fecm.run_one(small())
     bare = Result({name: result[name] for name in result}, {"deck": str(LONG)}, {})
-    found = page(bare=bare)
-    assert "Model" not in found.headings  # the text is no path that is followed
-    assert "at least" in found.text or "Peak force" in found.text
+    report_page = page(bare=bare)
+    assert "Model" not in report_page.headings  # the text is no path that is followed
+    assert "at least" in report_page.text or "Peak force" in report_page.text
 
 
 @pytest.mark.usefixtures("_undrawn")
@@ -299,19 +299,19 @@ def test_equal_results_give_equal_bytes(html: str) -> None:
 @pytest.mark.usefixtures("_unrendered")
 def test_several_runs_stand_side_by_side(failed: Result) -> None:
     other = fecm.run_one(small())
-    found = page(one=failed, other=other)
-    assert [cell.value for cell in found.row("velocity")] == [115.0, 115.0]
-    assert [cell.text for cell in found.row("elements")] == ["4", "4"]
-    peaks = [cell.text for cell in found.row("peak force")][:2]
+    report_page = page(one=failed, other=other)
+    assert [cell.value for cell in report_page.row("velocity")] == [115.0, 115.0]
+    assert [cell.text for cell in report_page.row("elements")] == ["4", "4"]
+    peaks = [cell.text for cell in report_page.row("peak force")][:2]
     assert peaks == [f"{failed.force.max():.4g}", "–"]  # the other ends in contact
-    assert found.row("kinematics")[1].text == "linear"
-    assert found.pictures
+    assert report_page.row("kinematics")[1].text == "linear"
+    assert report_page.pictures
 
 
 def test_columns_and_regions_of_a_page_have_names_of_their_own(failed: Result) -> None:
     other = fecm.run_one(small())
-    found = {"peak force": failed, "plate": other}  # names of rows too
-    for results in (found, {"one": failed}):
+    by_name = {"peak force": failed, "plate": other}  # names of rows too
+    for results in (by_name, {"one": failed}):
         html = render(page_of(results))
         regions = re.findall(r'role="region" aria-label="([^"]*)"', html)
         assert len(regions) > 3
@@ -321,9 +321,9 @@ def test_columns_and_regions_of_a_page_have_names_of_their_own(failed: Result) -
 
 def test_results_in_different_units_have_no_common_pictures(failed: Result) -> None:
     other = fecm.run_one(small().replace("ROD", "UNIT\nin lbf s\nROD", 1))
-    found = page(one=failed, other=other)
-    assert not found.pictures
-    assert "different units" in found.text
+    report_page = page(one=failed, other=other)
+    assert not report_page.pictures
+    assert "different units" in report_page.text
 
 
 @pytest.fixture(scope="module")
@@ -333,33 +333,33 @@ def sweep() -> fecm.SweepResult:
 
 @pytest.mark.usefixtures("_undrawn")
 def test_the_page_of_a_sweep_has_its_extremes(sweep: fecm.SweepResult) -> None:
-    found = page(sweep=sweep)
-    row = found.row("max indentation")
+    report_page = page(sweep=sweep)
+    row = report_page.row("max indentation")
     values = sweep["max_indentation"]
     assert [row[0].value, row[2].value] == [values.min(), values.max()]
     assert row[3].text == f"{values.argmax()}: velocity 400, k 1e+06"
-    assert found.row("velocity")[1].text == "50, 80, 400"
-    assert "6 cases" in found.text
-    assert all(agrees(cell) for cell in found.numbers())
+    assert report_page.row("velocity")[1].text == "50, 80, 400"
+    assert "6 cases" in report_page.text
+    assert all(agrees(cell) for cell in report_page.numbers())
     beyond = "indentation > h/4"
-    assert found.row("cases without a doubt")[0].value == (sweep.validity == "ok").sum()
-    assert beyond not in found.text
+    assert report_page.row("cases without a doubt")[0].value == (sweep.validity == "ok").sum()
+    assert beyond not in report_page.text
 
 
 @pytest.mark.usefixtures("_unrendered")
 def test_the_page_of_a_random_sweep_has_its_probabilities() -> None:
-    found = fecm.sweep(
+    swept = fecm.sweep(
         LONG,
         random={"velocity": "normal:115,5", "k": "lognormal:1.9e6,0.1"},
         samples=16,
         exceed={"peak_force": 85.0},
     )
-    shown = page(random=found)
-    assert found.random is not None
-    own = found.random.exceedance
+    shown = page(random=swept)
+    assert swept.random is not None
+    exceedance = swept.random.exceedance
     row = shown.row("peak force")
     chances = [row_.value for row_ in [r for r in shown.rows if len(r) == 7][-1][2:5]]
-    assert chances == [own.probability[0], own.lower[0], own.upper[0]]
+    assert chances == [exceedance.probability[0], exceedance.lower[0], exceedance.upper[0]]
     assert row
     assert shown.row("samples")[0].text == "16"
     assert shown.row("velocity")[1].text == "normal:115,5"
@@ -370,8 +370,8 @@ def test_the_page_of_a_random_sweep_has_its_probabilities() -> None:
 def test_the_page_of_a_sensitivity_study_tells_samples_draws_and_cases() -> None:
     """Saltelli's design of two names: 16 samples, two draws of each, and 16 (2 + 2) cases."""
     laws = {"velocity": "normal:115,5", "k": "lognormal:1.9e6,0.1"}
-    found = fecm.sweep(LONG, random=laws, samples=16, sensitivity=True)
-    shown = page(random=found)
+    swept = fecm.sweep(LONG, random=laws, samples=16, sensitivity=True)
+    shown = page(random=swept)
     counts = [shown.row(name)[0].text.split(",")[0] for name in ("draws", "cases")]
     assert counts == ["32", "64"]
 

@@ -62,10 +62,10 @@ def waves(pulse: Pulse, time: Floats, x: float, density: float = STEEL) -> Float
 def test_equation_4_5_gives_the_exact_force_at_the_middle(density: float) -> None:
     rows = table("rod_midforce_gauss_eq4-5.csv")
     exact = np.array([float(row[f"Fmid_lb_rho{density * 1e4:g}e-4"]) for row in rows])
-    found = simulate_pulse(rod(density), GAUSS, 2e-7, 600e-6, (0.5,))
-    assert found.time[::10] == pytest.approx(np.array([float(row["t_s"]) for row in rows]))
-    assert found.applied[::10] == pytest.approx(np.array([float(row["F_lb"]) for row in rows]))
-    force = found.forces[:, 0]
+    pulse = simulate_pulse(rod(density), GAUSS, 2e-7, 600e-6, (0.5,))
+    assert pulse.time[::10] == pytest.approx(np.array([float(row["t_s"]) for row in rows]))
+    assert pulse.applied[::10] == pytest.approx(np.array([float(row["F_lb"]) for row in rows]))
+    force = pulse.forces[:, 0]
     assert force.max() == pytest.approx(501.1, abs=0.5)
     # The pulse starts with a jump of 1.93 lb, which no mesh of 20 elements follows.
     assert np.sqrt(np.mean((force[::10] - exact) ** 2)) < 1.0
@@ -85,32 +85,32 @@ def test_the_light_rod_needs_half_the_time_step() -> None:
 
 def test_the_mean_ratio_is_the_reports() -> None:
     for pulse in (GAUSS, SINE):
-        found = simulate_pulse(rod(), pulse, 2e-7, pulse.duration, (0.5,))
-        assert found.mean_ratios[0] == pytest.approx(0.498, abs=5e-4)
+        pulse_result = simulate_pulse(rod(), pulse, 2e-7, pulse.duration, (0.5,))
+        assert pulse_result.mean_ratios[0] == pytest.approx(0.498, abs=5e-4)
 
 
 def test_a_sine_pulse_runs_as_its_waves_do_and_is_over_after_b() -> None:
     places = (0.25, 0.5, 0.731)
-    found = simulate_pulse(rod(elements=40), SINE, 5e-8, 600e-6, places, AVERAGE)
-    for force, x in zip(found.forces.T, places, strict=True):
-        assert np.abs(force - waves(SINE, found.time, x)).max() < 3.0  # of 1000
-    assert (found.applied[found.time > 400e-6] == 0.0).all()
+    pulse = simulate_pulse(rod(elements=40), SINE, 5e-8, 600e-6, places, AVERAGE)
+    for force, x in zip(pulse.forces.T, places, strict=True):
+        assert np.abs(force - waves(SINE, pulse.time, x)).max() < 3.0  # of 1000
+    assert (pulse.applied[pulse.time > 400e-6] == 0.0).all()
 
 
 def test_force_at_the_ends_is_the_applied_one_and_none_with_the_consistent_mass() -> None:
-    found = simulate_pulse(rod().with_mass(CONSISTENT), SINE, 2e-7, 600e-6, (0.0, 1.0))
-    assert np.abs(found.forces[:, 0] - found.applied).max() < 2.0
-    assert np.abs(found.forces[:, 1]).max() < 2.0
+    pulse = simulate_pulse(rod().with_mass(CONSISTENT), SINE, 2e-7, 600e-6, (0.0, 1.0))
+    assert np.abs(pulse.forces[:, 0] - pulse.applied).max() < 2.0
+    assert np.abs(pulse.forces[:, 1]).max() < 2.0
 
 
 def test_the_whole_rod_gets_the_pulses_impulse_at_every_point() -> None:
-    found = simulate_pulse(rod(), GAUSS, 2e-7, 600e-6, ())
-    impulse = found.applied.sum() * 2e-7
-    gained = found.accelerations.sum(axis=0) * 2e-7 * rod().total_mass
+    pulse = simulate_pulse(rod(), GAUSS, 2e-7, 600e-6, ())
+    impulse = pulse.applied.sum() * 2e-7
+    gained = pulse.accelerations.sum(axis=0) * 2e-7 * rod().total_mass
     assert gained == pytest.approx([impulse] * 3, rel=1e-3)
     # Section 4.2: virtually no difference between the accelerations.
-    late = found.time > 50e-6
-    assert np.ptp(found.accelerations[late], axis=1).max() < 0.02 * found.accelerations.max()
+    late = pulse.time > 50e-6
+    assert np.ptp(pulse.accelerations[late], axis=1).max() < 0.02 * pulse.accelerations.max()
 
 
 def test_a_rod_of_odd_elements_has_its_middle_inside_one() -> None:
@@ -209,9 +209,9 @@ def test_a_file_gets_the_numbers_and_the_user_a_summary(tmp_path: Path) -> None:
     assert "force at 0.5      peak 501.035 at time 0.0002028; mean ratio to the applied 0.498" in (
         done.stdout
     )
-    found = columns(out.read_text())
-    slow = Filter("first-order", 10e-6)(found["time"], found["force_at_0.5"])
-    np.testing.assert_array_equal(found["filtered_at_0.5"], slow)
+    read_columns = columns(out.read_text())
+    slow = Filter("first-order", 10e-6)(read_columns["time"], read_columns["force_at_0.5"])
+    np.testing.assert_array_equal(read_columns["filtered_at_0.5"], slow)
     assert_unusable(call("rod", *SHAPE, *PUSH, "-o", out))
     assert list(tmp_path.iterdir()) == [out]
 
@@ -230,9 +230,9 @@ def test_a_deck_gives_its_rod_and_its_time_step(tmp_path: Path) -> None:
 
 def test_mass_and_integrator_are_the_users_choice() -> None:
     options = ("--mass-matrix", CONSISTENT, "--integrator", AVERAGE)
-    found = columns(call("rod", *SHAPE, *PUSH, *options).stdout)
+    read_columns = columns(call("rod", *SHAPE, *PUSH, *options).stdout)
     expected = simulate_pulse(rod().with_mass(CONSISTENT), GAUSS, 2e-7, 600e-6, (0.5,), AVERAGE)
-    np.testing.assert_array_equal(found["force_at_0.5"], expected.forces[:, 0])
+    np.testing.assert_array_equal(read_columns["force_at_0.5"], expected.forces[:, 0])
 
 
 def test_a_table_in_a_file_is_a_pulse(tmp_path: Path) -> None:
@@ -244,10 +244,10 @@ def test_a_table_in_a_file_is_a_pulse(tmp_path: Path) -> None:
     assert_unusable(done)
     assert "time is in s, and the units of the model are not known" in done.stderr
     file.write_text(text.replace(" [lb]", "").replace(" (s)", ""))
-    found = columns(call(*options).stdout)
-    assert found["time"][-1] == pytest.approx(2e-4)
-    assert found["force"][50] == pytest.approx(50.0)
-    assert found["force"][150] == pytest.approx(50.0)
+    read_columns = columns(call(*options).stdout)
+    assert read_columns["time"][-1] == pytest.approx(2e-4)
+    assert read_columns["force"][50] == pytest.approx(50.0)
+    assert read_columns["force"][150] == pytest.approx(50.0)
 
 
 @pytest.mark.parametrize(
@@ -304,18 +304,18 @@ def result(runs: Path, tmp_path: Path) -> Path:
 
 
 def test_a_results_transducer_is_filtered_from_rest_on(result: Path) -> None:
-    found = columns(call("rod", "filter", result, "--filter", "moving-average:1e-6").stdout)
+    read_columns = columns(call("rod", "filter", result, "--filter", "moving-average:1e-6").stdout)
     loaded = fecm.load(result)
-    assert list(found) == ["time", "transducer", "filtered"]
-    np.testing.assert_array_equal(found["time"], loaded.time)
-    np.testing.assert_array_equal(found["transducer"], loaded.transducer)
+    assert list(read_columns) == ["time", "transducer", "filtered"]
+    np.testing.assert_array_equal(read_columns["time"], loaded.time)
+    np.testing.assert_array_equal(read_columns["transducer"], loaded.transducer)
     # A moving average rises from 10 to 90 % in 0.8 of its window.
     window = 1e-6 / 0.8
     time, force = (np.concatenate(([0.0], a)) for a in (loaded.time, loaded.transducer))
     before = np.linspace(-window, 0.0, 20_001)
     expected = [np.interp(before + t, time, force, left=0.0) for t in loaded.time]
     np.testing.assert_allclose(
-        found["filtered"],
+        read_columns["filtered"],
         [(part[0] / 2.0 + part[1:-1].sum() + part[-1] / 2.0) / 20_000 for part in expected],
         atol=1e-6 * force.max(),
     )
@@ -326,8 +326,8 @@ def test_a_table_is_filtered_by_the_column_that_is_named(tmp_path: Path) -> None
     file.write_text("t,a (mV),b (mV)\n0,0,5\n1,1,5\n2,2,5\n")
     options = ("rod", "filter", file, "--filter", "first-order:1")
     assert call(*options).stdout.startswith("time,a,filtered\n")
-    found = columns(call(*options, "--column", "b").stdout)
-    assert found["filtered"] == pytest.approx([5.0, 5.0, 5.0])
+    read_columns = columns(call(*options, "--column", "b").stdout)
+    assert read_columns["filtered"] == pytest.approx([5.0, 5.0, 5.0])
     done = call(*options, "--column", "c")
     assert_unusable(done)
     assert "has no column c; it has t, a, b" in done.stderr
@@ -400,10 +400,10 @@ def test_a_decks_own_rod_is_measured_at_its_own_transducer_and_a_rigid_mass_refu
     deck = tmp_path / "own.inp"
     deck.write_text(small(data=cards + DATA_CARDS))
     pulse = ["--pulse", "sine:1000,1e-4"]
-    own = call("rod", str(deck), *pulse)
+    answer = call("rod", str(deck), *pulse)
     named = call("rod", str(deck), *pulse, "--station", "0.5")
-    assert own.exit_code == 0
-    assert own.stdout == named.stdout
+    assert answer.exit_code == 0
+    assert answer.stdout == named.stdout
     deck.write_text(small(data="PROJ\n0, 0, 1.E-4\n" + DATA_CARDS))
     rigid = call("rod", str(deck), *pulse)
     assert rigid.exit_code == 2

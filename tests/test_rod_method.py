@@ -134,12 +134,12 @@ def energies(step: RodIntegrator, rod: Rod, steps: int) -> Floats:
     u = np.random.default_rng(9).normal(size=step.n)
     start: Floats = np.asarray(np.linalg.solve(matrix(rod), -rod.stiffness() @ u), dtype=np.float64)
     state = RodState.of(u, 0 * u, start)
-    found = []
+    values = []
     for _ in range(steps + 1):
         kinetic = rod.kinetic_energy(state.velocity[None])[0]
-        found.append(float(kinetic + rod.strain_energy(state.deformation[None])[0]))
+        values.append(float(kinetic + rod.strain_energy(state.deformation[None])[0]))
         state = step.advance(state)
-    return np.array(found)
+    return np.array(values)
 
 
 @pytest.mark.parametrize("mass", MASSES)

@@ -100,7 +100,7 @@ def bent(name: str, theory: str, words: str) -> Result:
     """Run a quarter of a plate of 16 x 16 elements under q = cos cos, its origin in the middle."""
     plies, layup, side = PLATES[name]
     along = np.cos(np.pi / side * np.array(grid_lines(uniform_section(side / 2.0, 8))))
-    made = decks.quarter_plate(
+    quarter = decks.quarter_plate(
         8,
         material(plies[0], layup),
         decks.program(words),
@@ -108,7 +108,7 @@ def bent(name: str, theory: str, words: str) -> Result:
         further=[THEORIES[theory], materials(*plies[1:])],
         side=side,
     )
-    return decks.run_of_deck(made)
+    return decks.run_of_deck(quarter)
 
 
 CASES = [(name, theory) for name in PLATES for theory in THEORIES]
@@ -124,19 +124,19 @@ def rows_of(name: str, theory: str) -> list[dict[str, str]]:
 def test_a_plate_of_several_materials_bends_as_naviers_solution(name: str, theory: str) -> None:
     rows = rows_of(name, theory)
     side = PLATES[name][2]
-    found = bent(name, theory, "TANG FORM SOLV DISP PLYS")
-    assert found.tape3.w[0, 0] == pytest.approx(float(rows[0]["w"]), rel=5e-4)
-    plies = found.plies()
+    bent_plate = bent(name, theory, "TANG FORM SOLV DISP PLYS")
+    assert bent_plate.tape3.w[0, 0] == pytest.approx(float(rows[0]["w"]), rel=5e-4)
+    plies = bent_plate.plies()
     x, y = np.pi / side * plies.x, np.pi / side * plies.y
     even, odd = np.cos(x) * np.cos(y), np.sin(x) * np.sin(y)
     largest = max(abs(float(row[key])) for row in rows for key in ("sx", "sy", "txy"))
     for ply, angle in enumerate(plies.angles):
-        own = [row for row in rows if int(row["layer"]) == ply + 1]
+        listed = [row for row in rows if int(row["layer"]) == ply + 1]
         names = ("sx", "sy") if angle == 0.0 else ("sy", "sx")
         stresses = ((plies.sigma_1, names[0], even), (plies.sigma_2, names[1], even),
                     (plies.tau_12, "txy", odd if angle == 0.0 else -odd))  # fmt: skip
         for values, key, shape in stresses:
-            for row in own:
+            for row in listed:
                 face = int(float(row["z/h"]) > plies.z[ply, 1] / (2.0 * -plies.z[0, 0]))
                 error = values[0, :, :, ply, face] - float(row[key]) * shape
                 assert np.abs(error).max() < 2e-3 * largest
@@ -148,17 +148,17 @@ def test_a_plate_of_several_materials_bends_as_naviers_solution(name: str, theor
         for layer, value in expected.items():
             # The last row of a layer below the middle: its upper face, or its lower one if the
             # middle is in it.
-            own = [r for r in rows if int(r["layer"]) == layer and float(r["z/h"]) < 0.0]
-            level = 2 if len(own) == 2 else 0
+            listed = [r for r in rows if int(r["layer"]) == layer and float(r["z/h"]) < 0.0]
+            level = 2 if len(listed) == 2 else 0
             error = values[0, :, layer - 1, level] - value * shapes[key]
             assert np.abs(error).max() < 5e-3 * size
 
 
 @pytest.mark.parametrize(("name", "theory"), CASES)
 def test_a_plate_of_several_materials_vibrates_as_naviers_solution(name: str, theory: str) -> None:
-    found = bent(name, theory, "CMAS EIGE=1")
+    bent_plate = bent(name, theory, "CMAS EIGE=1")
     expected = float(rows_of(name, theory)[0]["lowest omega_11"])
-    assert found.modes.angular_frequency[0] == pytest.approx(expected, rel=1e-4)
+    assert bent_plate.modes.angular_frequency[0] == pytest.approx(expected, rel=1e-4)
 
 
 def laminate_of(name: str) -> LaminateSection:
@@ -180,12 +180,12 @@ def test_the_shear_stiffness_of_several_materials_is_that_of_equal_energy(name: 
 
 def test_inertia_is_the_integral_of_the_density_by_layer() -> None:
     plies = (replace(HYBRID[0], density=1.0), replace(HYBRID[1], density=3.0))
-    made = laminate(plies, [0.0, 90.0], [1.0, 2.0])  # from -1.5 to -0.5 and to 1.5
-    assert made.mass == pytest.approx(1.0 * 1.0 + 3.0 * 2.0, rel=1e-14)
+    layup = laminate(plies, [0.0, 90.0], [1.0, 2.0])  # from -1.5 to -0.5 and to 1.5
+    assert layup.mass == pytest.approx(1.0 * 1.0 + 3.0 * 2.0, rel=1e-14)
     first = 1.0 * (0.25 - 2.25) / 2.0 + 3.0 * (2.25 - 0.25) / 2.0
-    assert made.coupling_inertia == pytest.approx(first, rel=1e-14)
+    assert layup.coupling_inertia == pytest.approx(first, rel=1e-14)
     second = 1.0 * (3.375 - 0.125) / 3.0 + 3.0 * (3.375 + 0.125) / 3.0
-    assert made.rotary_inertia == pytest.approx(second, rel=1e-14)
+    assert layup.rotary_inertia == pytest.approx(second, rel=1e-14)
 
 
 def test_residual_stresses_of_a_fibre_metal_laminate_are_those_of_the_least_energy() -> None:
@@ -199,18 +199,18 @@ def test_residual_stresses_of_a_fibre_metal_laminate_are_those_of_the_least_ener
     assert of_glass is not None
     z = [float(row["z_m"]) for row in rows]
     angles = [float(row["angle"]) for row in rows[::2]]
-    made = laminate([metal, glass, glass, metal], angles, np.subtract(z[1::2], z[::2]).tolist())
+    layup = laminate([metal, glass, glass, metal], angles, np.subtract(z[1::2], z[::2]).tolist())
     change = float(rows[0]["dT_K"])
     along = change * np.array([22.4e-6, of_glass.alpha1, of_glass.alpha1, 22.4e-6])
     across = change * np.array([22.4e-6, of_glass.alpha2, of_glass.alpha2, 22.4e-6])
-    found = residual_stresses(made, along, across)
+    residual = residual_stresses(layup, along, across)
     expected = np.array([[float(row[f"{s}_Pa"]) for s in ("s1", "s2", "t12")] for row in rows])
     atol = 1e-9 * np.abs(expected).max()
-    np.testing.assert_allclose(found.stresses.reshape(-1, 3), expected, rtol=0.0, atol=atol)
+    np.testing.assert_allclose(residual.stresses.reshape(-1, 3), expected, rtol=0.0, atol=atol)
     strain = [float(rows[0][key]) for key in ("eps0_x", "eps0_y", "gamma0_xy")]
-    np.testing.assert_allclose(found.strain, strain, rtol=1e-9, atol=1e-14)
+    np.testing.assert_allclose(residual.strain, strain, rtol=1e-9, atol=1e-14)
     curvature = [float(rows[0][key]) for key in ("kx_1/m", "ky_1/m", "kxy_1/m")]
-    np.testing.assert_allclose(found.curvature, curvature, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(residual.curvature, curvature, rtol=1e-9, atol=1e-12)
 
 
 def strips() -> list[list[float]]:
@@ -224,8 +224,8 @@ def test_a_bimetal_bends_as_timoshenkos(row: list[float]) -> None:
     e1, nu1, alpha1, h1, e2, nu2, alpha2, h2, change, expected = row
     plies = [decks.isotropic(e1, nu1, 1.0), decks.isotropic(e2, nu2, 1.0)]
     free = change * np.array([alpha1, alpha2])
-    found = residual_stresses(laminate(plies, [0.0, 0.0], [h1, h2]), free, free)
-    np.testing.assert_allclose(found.curvature, [expected, expected, 0.0], rtol=1e-9, atol=1e-12)
+    residual = residual_stresses(laminate(plies, [0.0, 0.0], [h1, h2]), free, free)
+    np.testing.assert_allclose(residual.curvature, [expected, expected, 0.0], rtol=1e-9, atol=1e-12)
 
 
 # Several laminates -------------------------------------------------------------------------------
@@ -251,7 +251,7 @@ def strip(row: dict[str, str], *others: model.Segment) -> tuple[Floats, Floats]:
     share = np.array([1.0, 4.0, 1.0]) / 6.0  # of the line in its nodes
     loads[:, grid.across // 2, 2] = force * share
     plate = material(ply, ((0.0, left, 1),))
-    made = decks.deck(
+    text = decks.deck(
         grid,
         (
             decks.restraints(grid, "11001 11101 11001 11101 11001"),
@@ -262,7 +262,7 @@ def strip(row: dict[str, str], *others: model.Segment) -> tuple[Floats, Floats]:
         ),
         decks.DEFLECTION,
     )
-    field = decks.run_of_deck(made).tape3.displacement[0].reshape(grid.up, grid.across, 5)
+    field = decks.run_of_deck(text).tape3.displacement[0].reshape(grid.up, grid.across, 5)
     return field[:, :, 2], field[:, :, 3]
 
 
@@ -460,11 +460,11 @@ def test_plies_have_the_z_and_strains_of_each_elements_own_laminate() -> None:
 
 
 def test_a_result_whose_elements_have_a_laminate_that_its_deck_lacks_is_refused() -> None:
-    found = fecm.run_one(unlike())
-    arrays = {path: found[path] for path in found}
-    arrays["mesh/laminate"] = np.where(np.arange(16) == 2, 7, found["mesh/laminate"])
+    result = fecm.run_one(unlike())
+    arrays = {path: result[path] for path in result}
+    arrays["mesh/laminate"] = np.where(np.arange(16) == 2, 7, result["mesh/laminate"])
     with pytest.raises(ResultFileError, match="does not have the laminates of its elements"):
-        Result(arrays, {"deck": found.deck_text}, {}).plies()
+        Result(arrays, {"deck": result.deck_text}, {}).plies()
 
 
 @pytest.mark.parametrize(
@@ -536,10 +536,10 @@ def test_lumped_and_consistent_masses_are_those_of_each_elements_own_laminate() 
 
 
 def test_resultants_are_those_of_each_elements_own_laminate() -> None:
-    found = fecm.run_one(unlike(words="STRE=20"))
+    result = fecm.run_one(unlike(words="STRE=20"))
     (problem,) = load_deck(unlike()).problems
     names = ("eps_xx", "eps_yy", "gamma_xy", "kappa_x", "kappa_y", "kappa_xy")
-    strains = np.stack([found[f"stresses/{name}"][-1] for name in names])
+    strains = np.stack([result[f"stresses/{name}"][-1] for name in names])
     for own, rows in problem.plate.rows_by_laminate:
         ABD = np.block([[own.A, own.B], [own.B, own.D]])
         expected = np.tensordot(ABD, strains[:, rows], 1)
@@ -547,7 +547,7 @@ def test_resultants_are_those_of_each_elements_own_laminate() -> None:
             ("N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy"), expected, strict=True
         ):
             atol = 1e-12 * np.abs(values).max()
-            stored = found[f"stresses/{name}"][-1, rows]
+            stored = result[f"stresses/{name}"][-1, rows]
             np.testing.assert_allclose(stored, values, rtol=1e-9, atol=atol)
 
 

@@ -53,12 +53,12 @@ def test_a_sweep_is_that_of_strikes_made_one_by_one(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text, vary = SWEEPS[name]
-    found = sweep(text, vary)
+    swept = sweep(text, vary)
     monkeypatch.setattr(impact_columns, "_from_values", lambda *_: None)
     wanted = sweep(text, vary)
     assert not wanted.completed.all()
     assert wanted.completed.any() or "rod_length" in vary
-    assert_same(found, wanted)
+    assert_same(swept, wanted)
 
 
 def test_valid_cases_of_a_plate_need_no_cards(monkeypatch: pytest.MonkeyPatch) -> None:

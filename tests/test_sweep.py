@@ -151,34 +151,40 @@ def test_cases_on_the_reports_plate_equal_their_full_runs() -> None:
         {"velocity": 150.0, "k": 2.5e6, "rod_mass": 4.0e-4, "s_p": 0.2, "q": 1.5},
     ]
     deck = model(LONG).with_(duration=1.2e-3)  # until the plate can't reach the slowest one
-    found = fecm.sweep(deck, cases=cases, history=True)
-    assert found.force is not None
-    assert found["status"].tolist() == ["ok"] * 3
+    sweep_result = fecm.sweep(deck, cases=cases, history=True)
+    assert sweep_result.force is not None
+    assert sweep_result["status"].tolist() == ["ok"] * 3
     for number, case in enumerate(cases):
         result = full(apply_case(deck, case))
         peak = result.force.max()
-        assert np.abs(found.force[number] - result.force).max() < 1e-9 * peak
-        assert found["peak_force"][number] == pytest.approx(peak, rel=1e-9)
-        assert found["time_of_peak"][number] == result.time[result.force.argmax()]
-        assert found["max_indentation"][number] == pytest.approx(result.indentation.max(), rel=1e-9)
+        assert np.abs(sweep_result.force[number] - result.force).max() < 1e-9 * peak
+        assert sweep_result["peak_force"][number] == pytest.approx(peak, rel=1e-9)
+        assert sweep_result["time_of_peak"][number] == result.time[result.force.argmax()]
+        assert sweep_result["max_indentation"][number] == pytest.approx(
+            result.indentation.max(), rel=1e-9
+        )
         permanent = result.history.attributes["permanent_indentation"]
-        assert found["permanent_indentation"][number] == pytest.approx(permanent, rel=1e-7)
+        assert sweep_result["permanent_indentation"][number] == pytest.approx(permanent, rel=1e-7)
 
 
 def test_momentum_and_energy_of_the_summary_are_those_of_the_rods_centre() -> None:
-    found = fecm.sweep(LONG, {"velocity": [115.0]})
+    sweep_result = fecm.sweep(LONG, {"velocity": [115.0]})
     result = full(model(LONG))
     mass = build_projectile(model(LONG)).total_mass
     # Momentum after the last contact: the rod's kinetic energy is that of its centre and of its
     # ringing, which is the smaller part.
-    rebound = float(found["rebound_velocity"][0])
+    rebound = float(sweep_result["rebound_velocity"][0])
     centre = 0.5 * mass * rebound**2
     kinetic = float(result["energy/projectile_kinetic"][-1])
     assert centre < kinetic < 1.02 * centre + 1e-3 * 1.1966
-    assert found["energy_absorbed"][0] == pytest.approx(0.5 * mass * 115.0**2 - centre, rel=1e-12)
-    assert found["impulse"][0] == pytest.approx(mass * (115.0 + rebound), rel=1e-12)
-    assert found["contacts"][0] == 2
-    assert found["contact_time"][0] == pytest.approx((result.force > 0.0).sum() * 2e-7, rel=1e-12)
+    assert sweep_result["energy_absorbed"][0] == pytest.approx(
+        0.5 * mass * 115.0**2 - centre, rel=1e-12
+    )
+    assert sweep_result["impulse"][0] == pytest.approx(mass * (115.0 + rebound), rel=1e-12)
+    assert sweep_result["contacts"][0] == 2
+    assert sweep_result["contact_time"][0] == pytest.approx(
+        (result.force > 0.0).sum() * 2e-7, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize(
@@ -193,11 +199,11 @@ def test_momentum_and_energy_of_the_summary_are_those_of_the_rods_centre() -> No
 @pytest.mark.few(7)  # of 14, 0.09 s each
 def test_whatever_varies_the_case_is_the_changed_decks_run(case: Case) -> None:
     deck = model(small(STEPS))
-    found = fecm.sweep(deck, cases=[case], history=True)
-    assert found["status"].tolist() == ["ok"]
-    assert found.force is not None
+    sweep_result = fecm.sweep(deck, cases=[case], history=True)
+    assert sweep_result["status"].tolist() == ["ok"]
+    assert sweep_result.force is not None
     result, plain = full(apply_case(deck, case)), full(deck)
-    difference = np.abs(found.force[0] - result.force).max()
+    difference = np.abs(sweep_result.force[0] - result.force).max()
     assert difference < 1e-9 * result.force.max()
     assert abs(result.force.max() / plain.force.max() - 1.0) > 1e-5
 
@@ -206,9 +212,9 @@ def test_cases_of_velocity_and_patch_equal_their_full_runs() -> None:
     shear = "SHEA MITC\nPATC\nHERT\n"
     deck = model(small(STEPS, data=shear + DATA_CARDS))
     vary = {"velocity": [60.0, 115.0], "patch": [0.1, 0.5]}
-    found = fecm.sweep(deck, vary, history=True)
-    assert found.force is not None
-    for force, case in zip(found.force, grid_cases(list(vary.items())), strict=True):
+    sweep_result = fecm.sweep(deck, vary, history=True)
+    assert sweep_result.force is not None
+    for force, case in zip(sweep_result.force, grid_cases(list(vary.items())), strict=True):
         patch = f"HERT,{case['patch']}\n"
         cards = DATA_CARDS.replace("     115.0", f"{case['velocity']:10.1f}")
         result = full(model(small(STEPS, data=shear.replace("HERT\n", patch) + cards)))
@@ -218,20 +224,20 @@ def test_cases_of_velocity_and_patch_equal_their_full_runs() -> None:
 def test_values_of_the_patch_that_cannot_be_are_cases_with_a_reason() -> None:
     patches = [(0.0, 1.0, 1.0), (0.1, 2.0, 1.0), (0.1, 1.0, 1.0)]
     cases = [dict(zip(("patch", "x0", "y0"), values, strict=True)) for values in patches]
-    found = fecm.sweep(model(small(STEPS)), cases=cases)
-    assert "must be positive" in found["status"][0]
-    assert "not on the plate" in found["status"][1]
-    assert found["status"][2] == "ok"
+    sweep_result = fecm.sweep(model(small(STEPS)), cases=cases)
+    assert "must be positive" in sweep_result["status"][0]
+    assert "not on the plate" in sweep_result["status"][1]
+    assert sweep_result["status"][2] == "ok"
     alone = fecm.sweep(model(small(STEPS)), {"x0": [1.0]})
     assert alone["status"].tolist() == ["The centre of the patch has x0, but no y0."]
 
 
 def test_a_layup_keeps_the_plys_thickness_and_a_thickness_scales_all() -> None:
     deck = model(small())
-    made = apply_case(deck, {"thickness": 0.3, "layup": "[0/45/90]"})
-    material = made.require(fecm.deck.model.Material)
+    changed = apply_case(deck, {"thickness": 0.3, "layup": "[0/45/90]"})
+    material = changed.require(fecm.deck.model.Material)
     assert [layer.thickness for layer in material.layers] == pytest.approx([0.1] * 3)
-    assert made.control.layers == 3
+    assert changed.control.layers == 3
     thin = apply_case(deck, {"layup": "[0/45/90]"}).require(fecm.deck.model.Material)
     assert thin.integration.thickness == pytest.approx(3 * 0.053)
 
@@ -241,14 +247,14 @@ def test_a_plate_with_other_loads_is_run_whole() -> None:
     deck = model(small(STEPS, data=load + DATA_CARDS))
     problem = sole_problem(deck)
     assert not shares_plate(problem)
-    found = fecm.sweep(deck, {"velocity": [50.0, 100.0]}, history=True)
-    assert found.force is not None
+    sweep_result = fecm.sweep(deck, {"velocity": [50.0, 100.0]}, history=True)
+    assert sweep_result.force is not None
     result = full(apply_case(deck, {"velocity": 100.0}))
-    np.testing.assert_array_equal(found.force[1], result.force)
+    np.testing.assert_array_equal(sweep_result.force[1], result.force)
 
 
 def test_a_case_that_fails_is_a_row_with_its_reason() -> None:
-    found = fecm.sweep(
+    sweep_result = fecm.sweep(
         model(small(STEPS)),
         cases=[
             {"thickness": 0.1, "k": -1e6},
@@ -256,11 +262,11 @@ def test_a_case_that_fails_is_a_row_with_its_reason() -> None:
             {"thickness": 0.1, "k": 1e6},
         ],
     )
-    assert found.completed.tolist() == [False, False, True]
-    assert "contact coefficient" in found["status"][0]
-    assert "thick" in found["status"][1]
-    assert np.isnan(found["peak_force"][:2]).all()
-    assert found["peak_force"][2] > 0.0
+    assert sweep_result.completed.tolist() == [False, False, True]
+    assert "contact coefficient" in sweep_result["status"][0]
+    assert "thick" in sweep_result["status"][1]
+    assert np.isnan(sweep_result["peak_force"][:2]).all()
+    assert sweep_result["peak_force"][2] > 0.0
 
 
 # What varies -------------------------------------------------------------------------------------
@@ -336,7 +342,7 @@ def children() -> list[int]:
 @pytest.mark.linux
 def test_a_worker_that_dies_costs_time_only() -> None:
     problem = sole_problem(model(small(STEPS)))
-    made = plan(problem, grid_cases([("layup", list(LAYUPS))]), history=True)
+    planned = plan(problem, grid_cases([("layup", list(LAYUPS))]), history=True)
     killed: list[int] = []
 
     def kill(task: Task, outcome: object) -> None:
@@ -344,7 +350,7 @@ def test_a_worker_that_dies_costs_time_only() -> None:
             killed.append(children()[-1])
             os.kill(killed[0], signal.SIGKILL)
 
-    shared = carry_out_plan(problem, made, Means(workers=2), done=kill)
+    shared = carry_out_plan(problem, planned, Means(workers=2), done=kill)
     assert killed
     assert_same(shared, serial())
 
@@ -357,7 +363,7 @@ def die(task: Task) -> Outcome:
 @pytest.mark.long
 def test_tasks_whose_workers_always_die_end_as_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = sole_problem(model(small()))
-    made = plan(problem, grid_cases([("layup", ["[0]", "[90]"])]))
+    planned = plan(problem, grid_cases([("layup", ["[0]", "[90]"])]))
     monkeypatch.setattr(execute, "attempt", die)
     monkeypatch.setattr(execute, "DEATHS", 1)
     lost: dict[int, str] = {}
@@ -365,7 +371,7 @@ def test_tasks_whose_workers_always_die_end_as_rows(monkeypatch: pytest.MonkeyPa
     def note(task: Task, outcome: Outcome) -> None:
         lost[task.number] = outcome.status[0]
 
-    on_workers(tasks(made), 2, note, lambda: None)
+    on_workers(tasks(planned), 2, note, lambda: None)
     assert lost == {0: LOST, 1: LOST}
 
 
@@ -376,7 +382,7 @@ def test_a_signal_to_workers_that_are_starting_costs_time_only(
 ) -> None:
     """An interrupt of the terminal goes to all processes."""
     problem = sole_problem(model(small()))
-    made = plan(problem, grid_cases([("layup", ["[0]", "[90]"])]))
+    planned = plan(problem, grid_cases([("layup", ["[0]", "[90]"])]))
     numbers: list[int] = []
     signals = [signal.SIGINT]
 
@@ -386,7 +392,7 @@ def test_a_signal_to_workers_that_are_starting_costs_time_only(
             for worker in multiprocessing.active_children():
                 os.kill(worker.pid or 0, number)
 
-    on_workers(tasks(made), 2, lambda task, outcome: numbers.append(task.number), interrupt)
+    on_workers(tasks(planned), 2, lambda task, outcome: numbers.append(task.number), interrupt)
     assert sorted(numbers) == [0, 1]
     assert capfd.readouterr().err == ""
 
@@ -397,13 +403,13 @@ def test_workers_of_a_sweep_that_stops_while_they_start_end_without_a_word(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     problem = sole_problem(model(small()))
-    made = plan(problem, grid_cases([("layup", ["[0]", "[90]"])]))
+    planned = plan(problem, grid_cases([("layup", ["[0]", "[90]"])]))
 
     def stop() -> None:
         raise StoppedError("stopped")
 
     with pytest.raises(StoppedError):
-        on_workers(tasks(made), 2, lambda task, outcome: None, stop)
+        on_workers(tasks(planned), 2, lambda task, outcome: None, stop)
     for worker in multiprocessing.active_children():
         worker.join()
     assert capfd.readouterr().err == ""
@@ -447,7 +453,7 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
 ) -> None:
     address, workers = cluster
     problem = sole_problem(model(small(STEPS)))
-    made = plan(problem, grid_cases([("layup", list(LAYUPS))]), history=True)
+    planned = plan(problem, grid_cases([("layup", list(LAYUPS))]), history=True)
     finished: list[int] = []
 
     def kill(task: Task, outcome: object) -> None:
@@ -455,7 +461,7 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
         if len(finished) == 5:
             workers[0].kill()
 
-    found = carry_out_plan(problem, made, Means(scheduler=address), done=kill)
+    found = carry_out_plan(problem, planned, Means(scheduler=address), done=kill)
     assert workers[0].poll() is not None or workers[0].wait(10) is not None
     assert sorted(finished) == list(range(16))
     assert_same(found, serial())
@@ -485,7 +491,7 @@ class Notes(fecm.Watch):
 def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     deck, layups = model(small()), LAYUPS[:8]
     problem = sole_problem(deck)
-    made = plan(problem, grid_cases([("layup", list(layups))]), history=True)
+    planned = plan(problem, grid_cases([("layup", list(layups))]), history=True)
     path = tmp_path / "sweep.h5"
     begun: list[int] = []
 
@@ -495,14 +501,16 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        carry_out_plan(problem, made, parts=PartialResults(path, made.fingerprint()), done=stop)
-    again = PartialResults(path, made.fingerprint())
-    before = [task.number for task in tasks(made) if again.get(task) is not None]
+        carry_out_plan(
+            problem, planned, parts=PartialResults(path, planned.fingerprint()), done=stop
+        )
+    again = PartialResults(path, planned.fingerprint())
+    before = [task.number for task in tasks(planned) if again.get(task) is not None]
     assert before == begun
     # A part that is not whole is run again.
     (again.folder / "task-000002.npz").write_bytes(b"PK\x03\x04 and no more")
     watch = Notes()
-    found = carry_out_plan(problem, made, parts=again, watch=watch, keeps_forces=False)
+    found = carry_out_plan(problem, planned, parts=again, watch=watch, keeps_forces=False)
     forces = [force for _, force in again.forces() if force is not None]
     at_once = fecm.sweep(deck, {"layup": layups}, history=True)
     assert_same(replace(found, force=np.vstack(forces)), at_once)

@@ -44,8 +44,8 @@ def short() -> fecm.Deck:
 def test_a_swept_value_in_another_unit_is_told_once(
     name: str, values: list[float], text: str
 ) -> None:
-    told = [note for note in sweep_notes(**{name: values}) if re.search(text, note)]
-    assert len(told) == 1
+    listed = [note for note in sweep_notes(**{name: values}) if re.search(text, note)]
+    assert len(listed) == 1
 
 
 @pytest.mark.parametrize(

@@ -95,10 +95,10 @@ def test_values_in_the_summary_have_the_digits_that_tell_cases_apart() -> None:
 
 
 def test_info_tells_programs_the_same(swept: Path) -> None:
-    told = json.loads(call("info", swept, "--format", "json").stdout)
-    assert (told["format"], told["cases"], told["failed"]) == ("fecm-sweep", 6, 3)
-    assert "steps" not in told
-    datasets = {d["name"]: d for group in told["groups"] for d in group["datasets"]}
+    document = json.loads(call("info", swept, "--format", "json").stdout)
+    assert (document["format"], document["cases"], document["failed"]) == ("fecm-sweep", 6, 3)
+    assert "steps" not in document
+    datasets = {d["name"]: d for group in document["groups"] for d in group["datasets"]}
     assert datasets["cases/layup"]["different"] == 2
     assert datasets["cases/velocity"]["max"] == 150.0
 
@@ -178,14 +178,14 @@ def test_cases_are_exported_a_row_each_with_their_texts(swept: Path, tmp_path: P
     assert (done.exit_code, done.stdout) == (0, f"{target}\n")
     with target.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    found = fecm.load_sweep(swept)
+    loaded = fecm.load_sweep(swept)
     assert [int(row["case"]) for row in rows] == list(range(6))
     assert list(rows[0])[:5] == ["case", "velocity", "layup", "peak_force", "time_of_peak"]
     assert list(rows[0])[-4:] == ["dt", "steps", "status", "validity"]
-    assert [float(row["velocity"]) for row in rows] == found["velocity"].tolist()
-    assert [row["layup"] for row in rows] == found["layup"].tolist()
-    assert [row["status"] for row in rows] == found["status"].tolist()
-    np.testing.assert_array_equal([float(row["impulse"]) for row in rows], found["impulse"])
+    assert [float(row["velocity"]) for row in rows] == loaded["velocity"].tolist()
+    assert [row["layup"] for row in rows] == loaded["layup"].tolist()
+    assert [row["status"] for row in rows] == loaded["status"].tolist()
+    np.testing.assert_array_equal([float(row["impulse"]) for row in rows], loaded["impulse"])
     assert call("export", swept, "--to", "csv", "-o", "-").stdout == target.read_text()
 
 
@@ -205,13 +205,13 @@ def test_columns_of_cases_have_the_units_that_the_deck_names(tmp_path: Path) -> 
 def test_forces_of_the_cases_that_were_run_are_exported_a_row_a_step(swept: Path) -> None:
     done = call("export", swept, "--to", "csv", "--dataset", "history", "-o", "-")
     rows = list(csv.DictReader(io.StringIO(done.stdout)))
-    found = fecm.load_sweep(swept)
-    assert found.force is not None
-    assert len(rows) == int(found.steps[found.completed].sum()) == 3 * found.force.shape[1]
-    assert sorted({int(row["case"]) for row in rows}) == np.flatnonzero(found.completed).tolist()
-    assert max(float(row["force"]) for row in rows) == np.nanmax(found["peak_force"])
+    loaded = fecm.load_sweep(swept)
+    assert loaded.force is not None
+    assert len(rows) == int(loaded.steps[loaded.completed].sum()) == 3 * loaded.force.shape[1]
+    assert sorted({int(row["case"]) for row in rows}) == np.flatnonzero(loaded.completed).tolist()
+    assert max(float(row["force"]) for row in rows) == np.nanmax(loaded["peak_force"])
     last = rows[-1]
-    assert float(last["time"]) == pytest.approx(int(last["step"]) * found.dt[4], rel=1e-12)
+    assert float(last["time"]) == pytest.approx(int(last["step"]) * loaded.dt[4], rel=1e-12)
 
 
 @pytest.mark.parametrize(

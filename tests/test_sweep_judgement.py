@@ -54,9 +54,9 @@ def test_a_case_that_a_run_rejects_fails_with_the_runs_reason(
         fecm.run(apply_case(deck, dict(case)))
     (name,) = case
     usual = {"k": 2e6, "rod_mass": 1.8e-4, "velocity": 100.0}[name]
-    found = fecm.sweep(deck, {name: [case[name], usual]})
-    assert found["status"].tolist() == [str(rejected.value), "ok"]
-    assert np.isnan(found["peak_force"][0])
+    swept = fecm.sweep(deck, {name: [case[name], usual]})
+    assert swept["status"].tolist() == [str(rejected.value), "ok"]
+    assert np.isnan(swept["peak_force"][0])
 
 
 def test_cases_together_keep_the_energy_as_well_as_their_runs_do(
@@ -113,9 +113,9 @@ def test_a_case_cut_off_in_contact_keeps_its_peaks_alone() -> None:
     "data", [DATA_CARDS, "FORC\n    8    0       0.0       0.0      1E-9\n\n" + DATA_CARDS]
 )
 def test_a_peak_at_the_last_step_is_no_peak(data: str) -> None:
-    found = fecm.sweep(small(data=data), {"velocity": [50.0]})
-    assert found["status"].tolist() == [Status.STILL]
-    assert all(np.isnan(found[name][0]) for name in SUMMARY)
+    swept = fecm.sweep(small(data=data), {"velocity": [50.0]})
+    assert swept["status"].tolist() == [Status.STILL]
+    assert all(np.isnan(swept[name][0]) for name in SUMMARY)
 
 
 # The command -------------------------------------------------------------------------------------

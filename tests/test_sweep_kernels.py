@@ -164,15 +164,15 @@ def test_a_plate_that_nothing_holds_bends_as_its_motion_less_the_rigid_motion_do
 @pytest.mark.parametrize("steps", [1, 2, 150])
 def test_the_response_of_a_plate_is_that_of_numpy(steps: int) -> None:
     (problem,) = load_deck(DECK.replace("EXPE", GAGE)).problems
-    found = []
+    values = []
     for solver in ("kernels", "numpy"):
         model = build_model(problem, RunOptions(solver=solver))
         assert model.impact is not None
         assert model.gages is not None
         gages = model.motion.dof_sums(model.gages.dof_indices, model.gages.weights)
         load = model.impact.contact.load
-        found.append(plate_response(model.motion, load, 2e-7, steps, gages))
-    for one, other in zip(found[0], found[1], strict=True):
+        values.append(plate_response(model.motion, load, 2e-7, steps, gages))
+    for one, other in zip(values[0], values[1], strict=True):
         np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-12 * np.abs(other).max())
 
 

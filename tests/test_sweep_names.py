@@ -37,9 +37,9 @@ ESTIMATE = ("--layup", "[0]8", "--ply-thickness", ".25", "--material", "T300/520
 def new(**options: str) -> Deck:
     """Deck that ``fecm new`` writes, with other options."""
     given = PLATE | {f"--{name}": value for name, value in options.items()}
-    made = call("new", "-", *(text for pair in given.items() for text in pair))
-    assert made.exit_code == 0, made.stderr
-    return model(made.stdout)
+    answer = call("new", "-", *(text for pair in given.items() for text in pair))
+    assert answer.exit_code == 0, answer.stderr
+    return model(answer.stdout)
 
 
 @functools.cache
@@ -78,15 +78,15 @@ CASES: list[tuple[Case, dict[str, str]]] = [
 @pytest.mark.few(3)  # of 7, 0.1 s each
 def test_a_case_is_the_deck_that_new_writes_with_its_values(number: int, patch: str) -> None:
     case, options = CASES[number]
-    found = fecm.sweep(new(patch=patch), cases=[case], history=True)
+    swept = fecm.sweep(new(patch=patch), cases=[case], history=True)
     expected = fecm.run_one(new(**options, patch=patch))
-    assert found.completed.all()
-    assert found.force is not None
-    assert found.dt[0] == expected.time[0]
+    assert swept.completed.all()
+    assert swept.force is not None
+    assert swept.dt[0] == expected.time[0]
     # The duration of a deck is a number of its own steps.
-    more = found.steps[0] - len(expected.time)
+    more = swept.steps[0] - len(expected.time)
     assert more == 0 if "duration" in case else more in (0, 1)
-    difference = np.abs(found.force[0, : len(expected.time)] - expected.force).max()
+    difference = np.abs(swept.force[0, : len(expected.time)] - expected.force).max()
     assert difference <= 1e-10 * expected.force.max()
 
 
@@ -101,10 +101,10 @@ def test_the_mesh_of_a_case_is_that_of_new(number: int) -> None:
 
 def test_an_energy_is_half_of_mass_times_velocity_squared() -> None:
     deck = new()
-    made = apply_case(deck, {"energy": 80.0, "mass": 5e-5})
-    assert made.require(Impact).velocity == pytest.approx(math.sqrt(2 * 80.0 / 5e-5), rel=1e-15)
+    changed = apply_case(deck, {"energy": 80.0, "mass": 5e-5})
+    assert changed.require(Impact).velocity == pytest.approx(math.sqrt(2 * 80.0 / 5e-5), rel=1e-15)
     rod = fecm.Rod.cylinder(200.0, 10.0, 2e5, 7.8e-9)
-    own = apply_case(
+    changed = apply_case(
         fecm.impact(
             fecm.Plate.rectangle((100, 100), (4, 4)),
             fecm.Laminate("[0]8", "T300/5208", 0.25),
@@ -117,8 +117,8 @@ def test_an_energy_is_half_of_mass_times_velocity_squared() -> None:
         {"energy": 80.0},
     )
     mass = math.pi / 4.0 * 10.0**2 * 200.0 * 7.8e-9
-    assert own.require(Impact).velocity == pytest.approx(math.sqrt(2 * 80.0 / mass), rel=1e-6)
-    found = fecm.sweep(deck, {"energy": [80.0], "mass": [2e-5, 5e-5]})
+    assert changed.require(Impact).velocity == pytest.approx(math.sqrt(2 * 80.0 / mass), rel=1e-6)
+    swept = fecm.sweep(deck, {"energy": [80.0], "mass": [2e-5, 5e-5]})
     speeds = [math.sqrt(2 * 80.0 / mass) for mass in (2e-5, 5e-5)]
     expected = fecm.sweep(
         deck,
@@ -127,7 +127,7 @@ def test_an_energy_is_half_of_mass_times_velocity_squared() -> None:
             for speed, mass in zip(speeds, (2e-5, 5e-5), strict=True)
         ],
     )
-    np.testing.assert_array_equal(found["peak_force"], expected["peak_force"])
+    np.testing.assert_array_equal(swept["peak_force"], expected["peak_force"])
 
 
 def test_a_radius_is_the_k_of_indent_estimate_for_a_steel_sphere() -> None:
@@ -178,15 +178,15 @@ def test_centre_of_patch_and_gages_are_scaled_with_the_plate() -> None:
 
 def test_places_that_can_not_be_hit_are_cases_with_a_reason() -> None:
     places = [(50, 50), (49, 52), (0, 50), (130, 50)]
-    found = fecm.sweep(new(patch="none"), {"at": places, "velocity": [2000.0, 3000.0]})
-    assert found["at"].tolist()[::2] == ["(50,50)", "(49,52)", "(0,50)", "(130,50)"]
-    assert found.completed.tolist() == [True] * 4 + [False] * 4
-    assert found["status"][4].startswith("Dof 3 of the impact node 11 is restrained")
-    assert found["status"][6] == "at (130,50) is outside the plate"
-    np.testing.assert_array_equal(found["hit_x"], [50.0] * 4 + [np.nan] * 4)
-    np.testing.assert_array_equal(found["peak_force"][:2], found["peak_force"][2:4])
-    assert found.unit("hit_x") == "mm"
-    (line,) = [line for line in sweep_summary(found) if line.startswith("moved")]
+    swept = fecm.sweep(new(patch="none"), {"at": places, "velocity": [2000.0, 3000.0]})
+    assert swept["at"].tolist()[::2] == ["(50,50)", "(49,52)", "(0,50)", "(130,50)"]
+    assert swept.completed.tolist() == [True] * 4 + [False] * 4
+    assert swept["status"][4].startswith("Dof 3 of the impact node 11 is restrained")
+    assert swept["status"][6] == "at (130,50) is outside the plate"
+    np.testing.assert_array_equal(swept["hit_x"], [50.0] * 4 + [np.nan] * 4)
+    np.testing.assert_array_equal(swept["peak_force"][:2], swept["peak_force"][2:4])
+    assert swept.unit("hit_x") == "mm"
+    (line,) = [line for line in sweep_summary(swept) if line.startswith("moved")]
     assert line == "moved             2: to the nearest node, up to 2.236 mm away"
     patched = fecm.sweep(new(), {"at": places})
     assert patched["hit_x"][:2].tolist() == [50.0, 49.0]
@@ -198,31 +198,31 @@ def test_places_that_can_not_be_hit_are_cases_with_a_reason() -> None:
 
 def test_dt_auto_is_dt_0_of_the_deck_of_the_case() -> None:
     deck = new(dt="2e-7")
-    found = fecm.sweep(deck, {"dt": ["auto", 2e-7], "thickness": [2.0, 8.0]})
-    assert found["dt"].tolist() == [0.0, 0.0, 2e-7, 2e-7]
-    assert found.completed.all()
+    swept = fecm.sweep(deck, {"dt": ["auto", 2e-7], "thickness": [2.0, 8.0]})
+    assert swept["dt"].tolist() == [0.0, 0.0, 2e-7, 2e-7]
+    assert swept.completed.all()
     for case, thickness in enumerate((2.0, 8.0)):
         expected = fecm.run_one(deck.with_(thickness=thickness, dt=0))
-        assert found.dt[case] == expected.time[0] > 2e-7
+        assert swept.dt[case] == expected.time[0] > 2e-7
         # The last step is the first at or after the duration.
-        assert found.steps[case] == len(expected.time) == math.ceil(5e-5 / found.dt[case])
-    assert found.steps[2] == 250
+        assert swept.steps[case] == len(expected.time) == math.ceil(5e-5 / swept.dt[case])
+    assert swept.steps[2] == 250
 
 
 def test_an_unstable_case_names_the_critical_step_and_the_remedy() -> None:
     deck = new(dt="5e-7")
-    found = fecm.sweep(deck, {"size": ["100x100", "15x15"]})
-    assert found.completed.tolist() == [True, False]
-    assert "critical time step" in found["status"][1]
-    assert found["status"][1].endswith("Vary dt=auto, or take DT 0.")
+    swept = fecm.sweep(deck, {"size": ["100x100", "15x15"]})
+    assert swept.completed.tolist() == [True, False]
+    assert "critical time step" in swept["status"][1]
+    assert swept["status"][1].endswith("Vary dt=auto, or take DT 0.")
     assert fecm.sweep(deck, {"size": ["15x15"], "dt": ["auto"]}).completed.all()
 
 
 def test_a_duration_is_reached_with_any_time_step_and_rounded_up_to_a_step() -> None:
     deck = new(dt="2e-7")
-    found = fecm.sweep(deck, {"duration": [2e-5, 2.01e-5], "dt": [2e-7, 4e-7]})
-    expected = [math.ceil(d / dt - 1e-9) for d, dt in zip(found["duration"], found.dt, strict=True)]
-    assert found.steps.tolist() == expected == [100, 50, 101, 51]
+    swept = fecm.sweep(deck, {"duration": [2e-5, 2.01e-5], "dt": [2e-7, 4e-7]})
+    expected = [math.ceil(d / dt - 1e-9) for d, dt in zip(swept["duration"], swept.dt, strict=True)]
+    assert swept.steps.tolist() == expected == [100, 50, 101, 51]
     bad = fecm.sweep(deck, {"duration": [0.0, -1.0]})
     assert bad["status"].tolist() == [f"duration must be positive, not {d}" for d in (0, -1)]
 
@@ -270,9 +270,9 @@ def test_measured_columns_are_those_of_full_runs(tmp_path: Path) -> None:
 
 def test_a_peak_at_the_end_of_an_open_run_is_not_known() -> None:
     deck = gaged().with_(duration=1e-5)
-    found = fecm.sweep(deck, {"velocity": [3000.0]}, measure="max_deflection")
-    assert found["status"].tolist() == ["still in contact"]
-    assert np.isnan(found["max_deflection"]).all()
+    swept = fecm.sweep(deck, {"velocity": [3000.0]}, measure="max_deflection")
+    assert swept["status"].tolist() == ["still in contact"]
+    assert np.isnan(swept["max_deflection"]).all()
     assert math.isnan(fecm.run_one(deck).metrics["max_deflection"])
 
 
@@ -306,9 +306,9 @@ def test_the_command_measures_and_counts_what_failed(tmp_path: Path) -> None:
     assert done.exit_code == 1
     assert done.stdout.splitlines()[-1] == "3 cases: 1 failed"
     assert done.stderr.count("B is not zero") == 0
-    found = fecm.load_sweep(path)
-    assert found["gage_1"][0] > 0.0
-    assert np.isnan(found["gage_1"][2])
+    swept = fecm.load_sweep(path)
+    assert swept["gage_1"][0] > 0.0
+    assert np.isnan(swept["gage_1"][2])
     lacking = call("sweep", deck, "--vary", "k=1e5", "--measure", "speed", "-o", path)
     assert lacking.exit_code == 2
     assert "'max_deflection', 'gages', 'failure'" in lacking.stderr
@@ -395,11 +395,11 @@ def test_the_help_of_the_command_lists_every_name() -> None:
 @pytest.mark.parametrize("name", VARIABLES)
 def test_a_value_is_stored_in_the_unit_of_its_dimension(name: str) -> None:
     units, none = {"length": "mm", "force": "N", "time": "s"}, np.zeros(0)
-    found = fecm.SweepResult({name: none}, {}, none, none, units=units)
+    swept = fecm.SweepResult({name: none}, {}, none, none, units=units)
     expected = VARIABLES[name].dimension
     for dimension, unit in units.items():
         expected = expected.replace(dimension, unit)
-    assert found.unit(name) == expected
+    assert swept.unit(name) == expected
 
 
 def test_cases_that_differ_in_their_strikes_share_one_deck(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -411,9 +411,9 @@ def test_cases_that_differ_in_their_strikes_share_one_deck(monkeypatch: pytest.M
 
     monkeypatch.setattr(methods, "apply_case", applied)
     vary = {"angle": [30.0], "velocity": [60.0, 115.0], "k": [1e6, 2e6], "mass": [2e-4, 3e-4]}
-    found = fecm.sweep(model(small()), vary)
-    assert len(found) == 8
-    assert len(set(found["peak_force"].tolist())) == 8
+    swept = fecm.sweep(model(small()), vary)
+    assert len(swept) == 8
+    assert len(set(swept["peak_force"].tolist())) == 8
     assert decks == [{"angle": 30.0}]
 
 

@@ -69,8 +69,8 @@ def test_cases_lost_with_their_workers_are_not_stored_as_finished(
     monkeypatch.setattr(execute, "attempt", attempt)
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
     problem = sole_problem(made.settings.deck)
-    found = carry_out_plan(problem, made, parts=parts)
-    assert found.completed.tolist() == [False, True]
+    outcome = carry_out_plan(problem, made, parts=parts)
+    assert outcome.completed.tolist() == [False, True]
     assert [parts.get(task) is None for task in tasks(made)] == [True, False]
 
 

@@ -22,7 +22,7 @@ LAYUPS = ("[0/90]2s", "[0_4/90_4]", "[45/-45]4")
 
 def new(layup: str, *options: str) -> str:
     """Deck that ``fecm new`` writes for a layup."""
-    made = call(
+    answer = call(
         "new",
         "-",
         "--size",
@@ -49,8 +49,8 @@ def new(layup: str, *options: str) -> str:
         "linear",
         *options,
     )
-    assert made.exit_code == 0
-    return made.stdout
+    assert answer.exit_code == 0
+    return answer.stdout
 
 
 @pytest.mark.parametrize(
@@ -60,21 +60,21 @@ def new(layup: str, *options: str) -> str:
 @pytest.mark.few(1)  # of 3, 0.5 s each
 def test_a_sweep_of_layups_is_new_and_run_of_each(base: str, support: str) -> None:
     options = "--support", support, "--duration", "5e-5"
-    found = fecm.sweep(new(base, *options), {"layup": LAYUPS}, history=True)
-    assert found.force is not None
+    swept = fecm.sweep(new(base, *options), {"layup": LAYUPS}, history=True)
+    assert swept.force is not None
     for case, layup in enumerate(LAYUPS):
         result = fecm.run_one(new(layup, *options))
-        assert found.dt[case] == pytest.approx(result.time[0], rel=1e-12)
-        steps = min(len(result.force), int(found.steps[case]))
+        assert swept.dt[case] == pytest.approx(result.time[0], rel=1e-12)
+        steps = min(len(result.force), int(swept.steps[case]))
         assert steps >= len(result.force) - 1
-        difference = np.abs(found.force[case, :steps] - result.force[:steps]).max()
+        difference = np.abs(swept.force[case, :steps] - result.force[:steps]).max()
         assert difference < 1e-9 * result.force.max()
 
 
 def test_an_unsymmetric_laminate_is_the_softer_one() -> None:
     deck = new(LAYUPS[0], "--support", "clamped", "--duration", "1e-3")
-    found = fecm.sweep(deck, {"layup": LAYUPS[:2]})
-    symmetric, unsymmetric = found["peak_force"]
+    swept = fecm.sweep(deck, {"layup": LAYUPS[:2]})
+    symmetric, unsymmetric = swept["peak_force"]
     assert unsymmetric < 0.97 * symmetric
 
 
@@ -109,8 +109,8 @@ def test_supports_in_the_plane_that_hold_some_nodes_only_are_kept() -> None:
         "    1    1   -1   -1    0    0    0\n", "    3    1   -1   -1    0    0    0\n"
     )
     deck = apply_case(model(small(mesh=mesh)), {"layup": "[0/90/0]"})
-    made = apply_case(deck, {"layup": "[0/90]"})
-    assert made.all(Boundary) == deck.all(Boundary)
+    changed = apply_case(deck, {"layup": "[0/90]"})
+    assert changed.all(Boundary) == deck.all(Boundary)
 
 
 def test_in_plane_unknowns_that_rest_do_not_limit_the_time_step() -> None:

@@ -43,13 +43,13 @@ def test_a_data_frame_is_a_table_of_cases() -> None:
         {"velocity": [50, 75.0, 115.0], "layup": ["[0/90]", "[90/0]", "[0]"], "impact_node": 13},
         index=[7, 7, 9],
     )
-    found = fecm.sweep(small(), cases=table, history=True)
+    swept = fecm.sweep(small(), cases=table, history=True)
     rows = fecm.sweep(small(), cases=table.to_dict("records"), history=True)
-    assert list(found.cases) == ["velocity", "layup", "impact_node"]
-    for name in found.cases:
-        assert found[name].tolist() == rows[name].tolist() == table[name].tolist()
-    np.testing.assert_array_equal(found.force, rows.force)
-    again = fecm.sweep(small(), cases=found.to_dataframe()[["velocity", "layup"]], history=True)
+    assert list(swept.cases) == ["velocity", "layup", "impact_node"]
+    for name in swept.cases:
+        assert swept[name].tolist() == rows[name].tolist() == table[name].tolist()
+    np.testing.assert_array_equal(swept.force, rows.force)
+    again = fecm.sweep(small(), cases=swept.to_dataframe()[["velocity", "layup"]], history=True)
     np.testing.assert_array_equal(again.force, rows.force)
 
 
@@ -80,14 +80,14 @@ def test_a_sweeps_file_opens_with_named_dimensions_and_units(tmp_path: Path) -> 
     pytest.importorskip("h5netcdf")
     path = tmp_path / "s.h5"
     deck = small(data=UNITS + DATA_CARDS)
-    found = fecm.sweep(deck, GRID, history=True, output=path)
+    swept = fecm.sweep(deck, GRID, history=True, output=path)
     dims = {"cases": {"case": 9}, "summary": {"case": 9}, "history": {"case": 9, "step": 10}}
     for group, sizes in dims.items():
         with xarray.open_dataset(path, group=group, engine="h5netcdf") as opened:
             assert dict(opened.sizes) == sizes
             if group == "summary":
                 assert opened.peak_force.attrs["units"] == "lbf"
-                assert opened.status.values.tolist() == found["status"].tolist()
+                assert opened.status.values.tolist() == swept["status"].tolist()
     with xarray.open_dataset(path, engine="h5netcdf") as root:
         assert (root.case.values.tolist(), root.step.values[[0, -1]].tolist()) == (
             [*range(9)],
@@ -98,16 +98,16 @@ def test_a_sweeps_file_opens_with_named_dimensions_and_units(tmp_path: Path) -> 
 def test_a_full_grid_has_a_dimension_per_name_and_other_cases_have_one(tmp_path: Path) -> None:
     pytest.importorskip("xarray")
     path = tmp_path / "s.h5"
-    found = fecm.sweep(small(data=UNITS + DATA_CARDS), GRID, history=True, output=path)
-    assert found.force is not None
-    arrays = found.to_xarray()
+    swept = fecm.sweep(small(data=UNITS + DATA_CARDS), GRID, history=True, output=path)
+    assert swept.force is not None
+    arrays = swept.to_xarray()
     assert arrays.identical(fecm.load_sweep(path).to_xarray())
     assert arrays.force.dims == ("velocity", "layup", "step")
     assert arrays.velocity.values.tolist() == [50.0, 75.0, 100.0]
     assert arrays.layup.values.tolist() == GRID["layup"]
     assert (arrays.velocity.attrs, arrays.force.attrs) == ({"units": "in/s"}, {"units": "lbf"})
-    for case, force in enumerate(found.force):
-        at = {name: values[case] for name, values in found.cases.items()}
+    for case, force in enumerate(swept.force):
+        at = {name: values[case] for name, values in swept.cases.items()}
         np.testing.assert_array_equal(arrays.force.sel(at), force)
     some = fecm.sweep(small(), cases=[{"velocity": 50.0, "k": 1e6}, {"velocity": 75.0, "k": 2e6}])
     assert some.to_xarray().peak_force.dims == ("case",)
@@ -119,11 +119,11 @@ def test_threads_and_processes_give_what_one_process_does() -> None:
     spawn = multiprocessing.get_context("spawn")
     for executor in (ThreadPoolExecutor(3), ProcessPoolExecutor(1, spawn)):
         with executor:
-            found = fecm.sweep(small(), GRID, history=True, executor=executor)
-        assert found.completed.sum() == 6
-        np.testing.assert_array_equal(found.force, serial.force)
+            swept = fecm.sweep(small(), GRID, history=True, executor=executor)
+        assert swept.completed.sum() == 6
+        np.testing.assert_array_equal(swept.force, serial.force)
         for name, values in serial.summary.items():
-            np.testing.assert_array_equal(found[name], values)
+            np.testing.assert_array_equal(swept[name], values)
         with pytest.raises(SchedulerError, match="after shutdown"):
             fecm.sweep(small(), GRID, executor=executor)
 
@@ -135,8 +135,8 @@ def test_the_callers_dask_client_stays_open_and_the_default() -> None:
     with distributed.LocalCluster(**where, dashboard_address=None) as cluster:
         with distributed.Client(cluster) as client:
             for scheduler in (cluster, client, cluster):
-                found = fecm.sweep(small(), GRID, history=True, scheduler=scheduler)
-                np.testing.assert_array_equal(found.force, serial.force)
+                swept = fecm.sweep(small(), GRID, history=True, scheduler=scheduler)
+                np.testing.assert_array_equal(swept.force, serial.force)
                 assert client.status == "running"
                 assert distributed.default_client() is client
             assert client.submit(sum, [2, 3]).result() == 5
@@ -177,7 +177,7 @@ def test_built_decks_give_the_results_of_runs_and_keep_names_and_measured_column
     tmp_path: Path,
 ) -> None:
     path, seen = tmp_path / "s.h5", list[tuple[int, int]]()
-    found = fecm.sweep(
+    swept = fecm.sweep(
         vary=OWN,
         build=plate,
         measure=readings,
@@ -186,40 +186,40 @@ def test_built_decks_give_the_results_of_runs_and_keep_names_and_measured_column
         progress=lambda *counts: seen.append(counts),
     )
     assert seen == [(done, 8) for done in range(1, 9)]
-    assert found.completed.tolist() == 2 * [True, True, False, False]
-    assert found["status"].tolist()[2:4] == [
+    assert swept.completed.tolist() == 2 * [True, True, False, False]
+    assert swept["status"].tolist()[2:4] == [
         "build: KeyError: 'no such plate'",
         "build: the units of the deck differ from the other cases",
     ]
-    assert found.force is not None
-    for case in np.flatnonzero(found.completed):
-        one = fecm.run_one(plate({name: found[name][case].item() for name in OWN}))
-        np.testing.assert_array_equal(found.force[case][: len(one.force)], one.force)
-        assert found["w"][case] == one.plate_w.max()
-        assert found["instants"][case] == len(one.tape3.time)
-    assert np.isnan(found["w"][~found.completed]).all()
+    assert swept.force is not None
+    for case in np.flatnonzero(swept.completed):
+        one = fecm.run_one(plate({name: swept[name][case].item() for name in OWN}))
+        np.testing.assert_array_equal(swept.force[case][: len(one.force)], one.force)
+        assert swept["w"][case] == one.plate_w.max()
+        assert swept["instants"][case] == len(one.tape3.time)
+    assert np.isnan(swept["w"][~swept.completed]).all()
     loaded = fecm.load_sweep(path)
     for name in ("speed", "kind", "w", "status"):
-        np.testing.assert_array_equal(loaded[name], found[name])
+        np.testing.assert_array_equal(loaded[name], swept[name])
     assert loaded["speed"].dtype.kind == "i"
     assert loaded.unit("w") == ""
     assert "measured by the caller" in call("info", path, "--format", "json").stdout
-    assert found.to_xarray()["w"].dims == ("speed", "kind")
+    assert swept.to_xarray()["w"].dims == ("speed", "kind")
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as executor:
         again = fecm.sweep(vary=OWN, build=plate, measure=readings, executor=executor)
-    np.testing.assert_array_equal(again["w"], found["w"])
+    np.testing.assert_array_equal(again["w"], swept["w"])
 
 
 def test_measured_columns_are_drawn_and_tabulated() -> None:
     pytest.importorskip("pandas")
     pytest.importorskip("matplotlib")
-    found = fecm.sweep(small(), {"velocity": [50.0, 100.0]}, measure=readings)
-    assert found.to_dataframe()["w"].tolist() == found["w"].tolist()
+    swept = fecm.sweep(small(), {"velocity": [50.0, 100.0]}, measure=readings)
+    assert swept.to_dataframe()["w"].tolist() == swept["w"].tolist()
     drawn = [
         np.asarray(line.get_ydata(), dtype=float).tolist()
-        for line in found.plot(quantity="w").lines
+        for line in swept.plot(quantity="w").lines
     ]
-    assert found["w"].tolist() in drawn
+    assert swept["w"].tolist() in drawn
 
 
 def test_readings_with_other_names_in_some_case_name_the_case() -> None:
@@ -267,12 +267,12 @@ def test_functions_that_can_not_be_meant_are_refused(options: dict[str, Any], me
 def test_findings_and_doubtful_cases_are_warnings_with_counts(tmp_path: Path) -> None:
     layups = {"layup": ["[0/90]", "[x]", "[y]", "[90/0]"]}
     with pytest.warns(fecm.FecmWarning) as caught:
-        found = fecm.sweep(small(), layups, output=tmp_path / "s.h5")
+        swept = fecm.sweep(small(), layups, output=tmp_path / "s.h5")
     texts = [str(warning.message) for warning in caught]
     assert {warning.filename for warning in caught} == {__file__}
     assert len(texts) > 1
     assert all("warning[W" in text for text in texts[:-1])
-    notes = list(found.notes)
+    notes = list(swept.notes)
     assert texts[-1].splitlines() == notes == list(fecm.load_sweep(tmp_path / "s.h5").notes)
     assert notes[0] == "2 of 4 cases still in contact at the end"
     assert notes[1] == "2 of 4 cases with an open peak"

@@ -58,11 +58,11 @@ def power_law(order: float) -> Floats:
 @pytest.mark.parametrize("order", [1.6, 2.0, 3.5])
 def test_a_power_law_has_its_order_and_its_limit(order: float) -> None:
     values = power_law(order)
-    found = found_from(values)
-    assert found.order == pytest.approx(order, rel=1e-9)
-    assert found.limit == pytest.approx(80.0, rel=1e-12)
-    assert found.band == pytest.approx(1.25 * (80.0 - values[-1]), rel=1e-9)
-    assert not found.remark
+    threshold = found_from(values)
+    assert threshold.order == pytest.approx(order, rel=1e-9)
+    assert threshold.limit == pytest.approx(80.0, rel=1e-12)
+    assert threshold.band == pytest.approx(1.25 * (80.0 - values[-1]), rel=1e-9)
+    assert not threshold.remark
 
 
 @pytest.mark.parametrize(("order", "nodes"), [(1.0, 9), (5.28, 9), (3.5, 4)])
@@ -70,20 +70,20 @@ def test_an_order_that_the_scheme_does_not_have_is_not_extrapolated(
     order: float, nodes: int
 ) -> None:
     values = power_law(order)
-    found = found_from(values, nodes)
-    assert found.order == pytest.approx(order, rel=1e-9)
-    assert "not yet asymptotic" in found.remark
+    threshold = found_from(values, nodes)
+    assert threshold.order == pytest.approx(order, rel=1e-9)
+    assert "not yet asymptotic" in threshold.remark
     used = min(order, 4.0 if nodes == 9 else 2.0)
     rest = (values[-1] - values[-2]) / (2.0**used - 1.0)
-    assert found.limit == pytest.approx(values[-1] + rest, rel=1e-12)
-    assert found.band == pytest.approx(3.0 * rest, rel=1e-9)
+    assert threshold.limit == pytest.approx(values[-1] + rest, rel=1e-12)
+    assert threshold.band == pytest.approx(3.0 * rest, rel=1e-9)
 
 
 def test_the_band_contains_the_limit_of_the_series_where_the_order_is_too_high() -> None:
     # Peak forces of the cross-ply plate with 12 x 8 elements, and Hertz's pressure on 0.25 in.
-    found = found_from([98.01768, 92.90860, 92.77713])
-    assert found.order > 5.0
-    assert abs(92.77713 - 92.7672) < found.band < 0.05
+    threshold = found_from([98.01768, 92.90860, 92.77713])
+    assert threshold.order > 5.0
+    assert abs(92.77713 - 92.7672) < threshold.band < 0.05
 
 
 @pytest.mark.parametrize(
@@ -99,9 +99,9 @@ def test_the_band_contains_the_limit_of_the_series_where_the_order_is_too_high()
 def test_no_order_is_stated_where_there_is_none(
     values: list[float], limit: float, remark: str
 ) -> None:
-    found = found_from(values)
-    np.testing.assert_equal(found.limit, limit)
-    assert remark in found.remark
+    threshold = found_from(values)
+    np.testing.assert_equal(threshold.limit, limit)
+    assert remark in threshold.remark
 
 
 def test_the_band_of_two_meshes_holds_down_to_order_1() -> None:
@@ -122,15 +122,15 @@ def test_the_deck_of_a_sweep_is_never_read_as_a_path(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_the_limit_of_two_meshes_is_that_of_the_series() -> None:
-    found = fecm.sweep(plate(), refine=[1, 2], history=True)
-    assert found["elements"].tolist() == [216, 864]
-    assert found["dt"][0] == 2.0 * found["dt"][1]
-    assert found.steps[1] == pytest.approx(2 * found.steps[0], abs=1)
+    swept = fecm.sweep(plate(), refine=[1, 2], history=True)
+    assert swept["elements"].tolist() == [216, 864]
+    assert swept["dt"][0] == 2.0 * swept["dt"][1]
+    assert swept.steps[1] == pytest.approx(2 * swept.steps[0], abs=1)
     # The first of several peaks, which the run of the projectile's approach ends after.
-    assert np.isnan(found["peak_force"]).all()
-    assert found.force is not None
-    first = {"peak_force": np.nanmax(found.force, axis=1)}
-    limit = convergence(found.cases, first, 9)["peak_force"].limit
+    assert np.isnan(swept["peak_force"]).all()
+    assert swept.force is not None
+    first = {"peak_force": np.nanmax(swept.force, axis=1)}
+    limit = convergence(swept.cases, first, 9)["peak_force"].limit
     assert limit == pytest.approx(PEAK, rel=1e-3)
 
 
@@ -147,11 +147,11 @@ def test_order_and_limit_of_three_meshes_are_printed_and_stored(tmp_path: Path) 
     assert stored["order"] == pytest.approx(order, abs=5e-3)
     assert stored["limit"] == pytest.approx(limit, rel=1e-5)
     assert stored["band"] == pytest.approx(band, rel=1e-1)
-    found = fecm.load_sweep(tmp_path / "s.h5")
-    assert found["validity"].tolist() == ["ok"] * 3
-    assert limit == pytest.approx(found["peak_force"][-1], rel=1e-3)
+    swept = fecm.load_sweep(tmp_path / "s.h5")
+    assert swept["validity"].tolist() == ["ok"] * 3
+    assert limit == pytest.approx(swept["peak_force"][-1], rel=1e-3)
     assert order > 1.0
-    assert found.convergence["peak_force"].order == stored["order"]
+    assert swept.convergence["peak_force"].order == stored["order"]
 
 
 @pytest.mark.parametrize(

@@ -168,13 +168,13 @@ def test_the_steps_to_the_critical_one_do_not_grow_with_the_plate(
 
     monkeypatch.setattr(time_step, "_accelerations", counted)
     model = slender(600)
-    found = critical_time_step(model)
+    critical = critical_time_step(model)
     assert products <= 101
     scale = sparse.diags_array(1.0 / np.sqrt(model.mass))
     above = (2.0 / safe_time_step(model)) ** 2
     matrix = (scale @ model.stiffness @ scale).tocsc()
     (largest,) = eigsh(matrix, 1, sigma=above, return_eigenvectors=False)
-    assert 0.0 <= found * np.sqrt(largest) / 2.0 - 1.0 < 5e-4
+    assert 0.0 <= critical * np.sqrt(largest) / 2.0 - 1.0 < 5e-4
 
 
 @pytest.mark.skipif(kernels.LIBRARY is None, reason="the kernels are not compiled")
@@ -193,8 +193,8 @@ def test_a_spring_on_one_node_is_part_of_the_critical_step() -> None:
     spring = 40.0 * float(model.stiffness.diagonal().max())
     K = model.stiffness.toarray() + spring * np.outer(weights, weights)
     squares = eigh(K, np.diag(model.mass), eigvals_only=True)
-    found = critical_time_step(model, (weights, spring))
-    assert found == pytest.approx(2.0 / np.sqrt(squares[-1]), rel=5e-5)
+    critical = critical_time_step(model, (weights, spring))
+    assert critical == pytest.approx(2.0 / np.sqrt(squares[-1]), rel=5e-5)
 
 
 # Of a Lanczos iteration with a residual of 1e-4, in the deck's unit of time.

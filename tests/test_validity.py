@@ -29,8 +29,8 @@ def notes(folder: Path, text: str) -> tuple[list[str], Result]:
     (folder / "d.inp").write_text(text)
     done = call("run", "d.inp", "--overwrite", cwd=folder)
     assert done.exit_code == 0, done.stderr
-    found = [line for line in done.stderr.splitlines() if re.search("beyond|exposure above", line)]
-    return found, fecm.load(folder / "d.h5")
+    values = [line for line in done.stderr.splitlines() if re.search("beyond|exposure above", line)]
+    return values, fecm.load(folder / "d.h5")
 
 
 def numbers(line: str) -> list[float]:
@@ -143,8 +143,8 @@ def test_an_estimate_warns_of_its_static_plate(tmp_path: Path) -> None:
         text = small(mesh=HELD).replace("115.0", velocity).replace("EXPE", "PATC\nDISC,.2\nEXPE")
         (tmp_path / "d.inp").write_text(text)
         done = call("estimate", "d.inp", "--format", "json", cwd=tmp_path)
-        found = json.loads(done.stdout)
-        w = found["models"][1]["peak_force"] / found["stiffness"]
+        document = json.loads(done.stdout)
+        w = document["models"][1]["peak_force"] / document["stiffness"]
         assert (w > 0.3 * 0.106) == warned
         assert ("the static plate deflects by" in done.stderr) == warned
 

@@ -89,16 +89,16 @@ def test_programs_get_every_number_and_what_could_not_be_computed_is_null(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     done = call("verify", "indentation", "--format", "json")
-    told = json.loads(done.stdout)
-    assert (done.exit_code, told["ok"], len(told["rows"])) == (0, True, 12)
-    first = told["rows"][0]
+    document = json.loads(done.stdout)
+    assert (done.exit_code, document["ok"], len(document["rows"])) == (0, True, 12)
+    first = document["rows"][0]
     assert first["expected"] == 22.4
     assert first["error"] == pytest.approx(first["got"] / 22.4 - 1.0)
     monkeypatch.setattr(LinearPermanent, "loading", None)
     done = call("verify", "indentation", "--format", "json")
-    told = json.loads(done.stdout)
-    assert (done.exit_code, told["ok"], told["rows"][0]["got"]) == (1, False, None)
-    assert told["rows"][0]["failure"].startswith("TypeError: ")
+    document = json.loads(done.stdout)
+    assert (done.exit_code, document["ok"], document["rows"][0]["got"]) == (1, False, None)
+    assert document["rows"][0]["failure"].startswith("TypeError: ")
 
 
 def test_a_row_beyond_its_tolerance_is_told_and_the_answer_is_no(
@@ -129,8 +129,8 @@ def test_a_list_names_the_cases_without_computing_them(monkeypatch: pytest.Monke
     monkeypatch.setattr("fecm.cli.verify.compute_rows", None)
     done = call("verify", "--list")
     assert [line.split()[0] for line in done.stdout.splitlines()] == [one.name for one in CASES]
-    told = json.loads(call("verify", "--list", "patch", "--format", "json").stdout)
-    assert [(one["case"], one["rows"]) for one in told["cases"]] == [("patch", 8)]
+    document = json.loads(call("verify", "--list", "patch", "--format", "json").stdout)
+    assert [(one["case"], one["rows"]) for one in document["cases"]] == [("patch", 8)]
 
 
 def test_what_can_not_be_meant_is_refused() -> None:
@@ -187,9 +187,9 @@ def test_expected_values_are_those_of_closed_forms(one: Case) -> None:
 
 @pytest.mark.parametrize("ratio", [10, 100])
 def test_paganos_printed_sandwich_is_that_of_the_exact_solution(ratio: int) -> None:
-    own = [r for r in reference("several_materials.csv") if f"sandwich S={ratio}" in r["case"]]
+    values = [r for r in reference("several_materials.csv") if f"sandwich S={ratio}" in r["case"]]
     upper, middle = (
-        next(r for r in own if "elasticity" in r["theory"] and float(r["z/h"]) == z)
+        next(r for r in values if "elasticity" in r["theory"] and float(r["z/h"]) == z)
         for z in (0.5, 0.0)
     )
     (one,) = chosen(["sandwich"])
@@ -227,7 +227,7 @@ def test_zeners_figures_are_the_solution_of_his_equations() -> None:
         force = k * max(y[0], 0.0) ** 1.5
         return [y[1] - slope * force, -force / m]  # approach; velocity of the mass
 
-    found = solve_ivp(
+    solution = solve_ivp(
         rate,
         (0.0, 200e-6),
         [0.0, v],
@@ -237,11 +237,11 @@ def test_zeners_figures_are_the_solution_of_his_equations() -> None:
         dense_output=True,
         events=lambda t, y: rate(t, y)[0],
     )
-    time = found.t_events[0][0]
+    time = solution.t_events[0][0]
     figures = (
-        ("largest force", k * found.sol(time)[0] ** 1.5),
+        ("largest force", k * solution.sol(time)[0] ** 1.5),
         ("its time", time),
-        ("velocity at 200", -found.y[1, -1]),
+        ("velocity at 200", -solution.y[1, -1]),
     )
     for quantity, value in figures:
         assert check_of("infinite-plate", quantity).expected == pytest.approx(value, rel=1e-8)

@@ -70,8 +70,8 @@ def test_fronts_have_the_reference_files_normal_velocities(report: WaveSurfaces)
     rows = table("waves_normal_velocity.csv")
     names = ("c_ext", "c_inshear", "c_bend", "c_twist", "c_transverse_shear (in/s)")
     expected = np.stack([column(rows, name) for name in names], axis=1)
-    found = report.fronts(column(rows, "theta_deg")).velocity
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    velocity = report.fronts(column(rows, "theta_deg")).velocity
+    np.testing.assert_allclose(velocity, expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("mode", ["extension", "inplane_shear", "bending", "twisting"])
@@ -207,8 +207,8 @@ def test_fronts_of_an_unsymmetric_laminate_are_the_roots_of_its_determinant(
 ) -> None:
     plate = laminate(GENERAL_PLY, angles, (0.1, 0.05, 0.15))
     normals = np.arange(0.0, 361.0, 15.0)
-    found = WaveSurfaces(Medium(plate)).fronts(normals).velocity
-    for normal, row in zip(normals, found, strict=True):
+    velocity = WaveSurfaces(Medium(plate)).fronts(normals).velocity
+    for normal, row in zip(normals, velocity, strict=True):
         expected = velocities(entries(plate, float(normal), None))
         np.testing.assert_allclose(np.sort(row), expected, rtol=1e-7)
 
@@ -400,8 +400,8 @@ def test_cusps_of_a_circle_come_only_after_a_while(report: WaveSurfaces) -> None
     fastest = -(around.velocity + around.curvature).min(axis=0)
     first = 0.106 / fastest[FRONTS.index("in_plane_shear")]
     for time, there in ((0.999 * first, False), (1.001 * first, True)):
-        found = [cusp.mode for cusp in report.cusps(time, 0.106)]
-        assert ("in_plane_shear" in found) == there
+        values = [cusp.mode for cusp in report.cusps(time, 0.106)]
+        assert ("in_plane_shear" in values) == there
 
 
 # Wrong input ------------------------------------------------------------------------------------
@@ -422,8 +422,8 @@ def test_a_laminate_that_can_carry_no_waves_is_refused() -> None:
 def test_a_decks_own_shear_correction_counts(tmp_path: Path) -> None:
     deck = tmp_path / "corrected.inp"
     deck.write_text(small(data="SHEA\n0.8\n" + DATA_CARDS))
-    own = call("waves", "speeds", str(deck), "--step", "45")
+    answer = call("waves", "speeds", str(deck), "--step", "45")
     deck.write_text(small())
     given = ["waves", "speeds", str(deck), "--step", "45", "--shear-factor", "0.8"]
-    assert own.exit_code == 0
-    assert own.stdout == call(*given).stdout
+    assert answer.exit_code == 0
+    assert answer.stdout == call(*given).stdout

@@ -32,11 +32,11 @@ def test_dispersion_of_the_reports_deck_is_the_reference_files() -> None:
     assert done.stdout.splitlines()[0] == (
         "angle_deg,wavelength_over_h,mode,phase_velocity,angular_frequency"
     )
-    found = rows(done)
-    assert len(found) == 3 * 10 * 5
-    assert [row["mode"] for row in found[:5]] == list(MODES)
+    table_rows = rows(done)
+    assert len(table_rows) == 3 * 10 * 5
+    assert [row["mode"] for row in table_rows[:5]] == list(MODES)
     compared = 0
-    for row in found:
+    for row in table_rows:
         known = expected[float(row["angle_deg"]), float(row["wavelength_over_h"])]
         if row["mode"].startswith("flexural"):
             velocity = float(known[f"mode{row['mode'][-1]}_c_in/s"])
@@ -51,9 +51,9 @@ def test_speeds_of_the_reports_deck_are_the_reference_files() -> None:
     done = call("waves", "speeds", LONG, "--step", "15")
     header = "angle_deg,extension,in_plane_shear,bending,twisting,transverse_shear"
     assert done.stdout.splitlines()[0] == header
-    found = np.array([list(map(float, row.values())) for row in rows(done)])
+    values = np.array([list(map(float, row.values())) for row in rows(done)])
     expected = [list(map(float, row.values())) for row in table("waves_normal_velocity.csv")]
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    np.testing.assert_allclose(values, expected, rtol=1e-9)
     assert done.stderr == ""
 
 
@@ -62,12 +62,12 @@ def test_fronts_of_the_reports_deck_are_the_reference_files() -> None:
     assert done.stdout.splitlines()[0] == (
         "mode,normal_deg,time,x,y,ray_deg,length_per_radian,strength"
     )
-    found = {(r["mode"], float(r["normal_deg"]), float(r["time"])): r for r in rows(done)}
-    assert len(found) == 5 * 9 * 2
+    by_name = {(r["mode"], float(r["normal_deg"]), float(r["time"])): r for r in rows(done)}
+    assert len(by_name) == 5 * 9 * 2
     for row in table("waves_wavefront_rays.csv"):
         mode = row["mode"].replace("inplane", "in_plane")
         for time, name in ((2e-6, "t2us"), (1e-5, "t10us")):
-            mine = found[mode, float(row["normal_deg"]), time]
+            mine = by_name[mode, float(row["normal_deg"]), time]
             for axis in "xy":
                 expected = float(row[f"{axis}_{name}"])
                 assert float(mine[axis]) == pytest.approx(expected, rel=1e-7, abs=1e-8)
@@ -129,18 +129,20 @@ def test_headers_have_the_units_of_a_named_ply(command: tuple[str, ...], header:
 )
 @pytest.mark.few(1)  # of 4, 0.2 s each
 def test_several_times_may_be_given_in_several_ways(times: tuple[object, ...]) -> None:
-    found = rows(call("waves", "fronts", "--step", "45", *times))
-    assert {float(row["time"]) for row in found} == {1e-6, 2e-6}
-    assert len(found) == 5 * 9 * 2
+    table_rows = rows(call("waves", "fronts", "--step", "45", *times))
+    assert {float(row["time"]) for row in table_rows} == {1e-6, 2e-6}
+    assert len(table_rows) == 5 * 9 * 2
 
 
 def test_negative_angles_are_no_options() -> None:
-    found = rows(
+    table_rows = rows(
         call("waves", "dispersion", "--angle", "-45", "30", LONG, "--wavelengths", "2:2:1")
     )
-    assert [float(row["angle_deg"]) for row in found] == [-45.0] * 5 + [30.0] * 5
+    assert [float(row["angle_deg"]) for row in table_rows] == [-45.0] * 5 + [30.0] * 5
     waves = dispersion(Medium(report_plate()), -45.0, [2.0]).phase_velocity[0]
-    np.testing.assert_allclose([float(r["phase_velocity"]) for r in found[:5]], waves, rtol=1e-9)
+    np.testing.assert_allclose(
+        [float(r["phase_velocity"]) for r in table_rows[:5]], waves, rtol=1e-9
+    )
 
 
 def test_the_shear_factor_multiplies_the_transverse_shear_stiffness() -> None:
@@ -162,10 +164,10 @@ def test_fronts_start_from_a_circle_of_the_given_radius() -> None:
 
 def test_normals_run_from_0_to_360_as_far_as_the_step_goes() -> None:
     for step, expected in (("90", [0, 90, 180, 270, 360]), ("100", [0, 100, 200, 300])):
-        found = [
+        values = [
             float(row["angle_deg"]) for row in rows(call("waves", "speeds", LONG, "--step", step))
         ]
-        assert found == expected
+        assert values == expected
     tenths = rows(call("waves", "speeds", LONG, "--step", ".3"))
     assert len(tenths) == 1201
     assert float(tenths[-1]["angle_deg"]) == 360.0
