@@ -30,15 +30,15 @@ def instead(owner: Any, name: str, broken: Callable[..., Any]) -> Break:
     """
 
     def apply(monkeypatch: pytest.MonkeyPatch) -> None:
-        found = inspect.getattr_static(owner, name)
-        right = found.fget if isinstance(found, property) else found
+        actual = inspect.getattr_static(owner, name)
+        right = actual.fget if isinstance(actual, property) else actual
 
         def wrapper(*args: Any, **kwargs: Any) -> Any:
             return broken(right, *args, **kwargs)
 
         if isinstance(owner, type):
             monkeypatch.setattr(
-                owner, name, property(wrapper) if isinstance(found, property) else wrapper
+                owner, name, property(wrapper) if isinstance(actual, property) else wrapper
             )
             return
         for module in [m for n, m in sys.modules.items() if n.partition(".")[0] == "fecm"]:
@@ -88,7 +88,7 @@ def in_laminate(**changes: Callable[[Any], Any]) -> Break:
     return changed(
         laminates,
         "laminate",
-        lambda made: replace(made, **{n: new(getattr(made, n)) for n, new in changes.items()}),
+        lambda built: replace(built, **{n: new(getattr(built, n)) for n, new in changes.items()}),
     )
 
 
@@ -130,7 +130,7 @@ def without_coupling(names: str) -> Break:
         uncoupled = [(replace(laminate, B=0.0 * laminate.B), rows) for laminate, rows in laminates]
         poor = right(strains, uncoupled, *others)
         rich = right(strains, laminates, *others)
-        return rich | {name: found for name, found in poor.items() if name[0] == names}
+        return rich | {name: actual for name, actual in poor.items() if name[0] == names}
 
     return instead(strains, "strains_and_resultants", broken)
 
@@ -148,21 +148,21 @@ def exchanged_forces(right: Any, family: Any, preload: Any, rules: Any) -> Any:
 
 def of_q16(right: Any, q: Any, angle: float) -> Any:
     m, n = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
-    made, second = right(q, angle), (q[0, 1] - q[1, 1] + 2.0 * q[2, 2]) * m * n**3
-    made[0, 2] -= 2.0 * second
-    made[2, 0] -= 2.0 * second
-    return made
+    built, second = right(q, angle), (q[0, 1] - q[1, 1] + 2.0 * q[2, 2]) * m * n**3
+    built[0, 2] -= 2.0 * second
+    built[2, 0] -= 2.0 * second
+    return built
 
 
 def plane_stress_of_strain(right: Any, ply: Any) -> Any:
-    made = right(ply)
-    made[:2, :2] *= 1.0 - ply.nu12**2 * ply.e2 / ply.e1
-    return made
+    built = right(ply)
+    built[:2, :2] *= 1.0 - ply.nu12**2 * ply.e2 / ply.e1
+    return built
 
 
-def moved_midplane(made: Any) -> Any:
-    d = made.thickness / 6.0
-    return replace(made, B=made.B + d * made.A, D=made.D + 2.0 * d * made.B + d**2 * made.A)
+def moved_midplane(built: Any) -> Any:
+    d = built.thickness / 6.0
+    return replace(built, B=built.B + d * built.A, D=built.D + 2.0 * d * built.B + d**2 * built.A)
 
 
 def equal_shares(right: Any, *args: Any) -> Any:
@@ -254,7 +254,7 @@ def other_power(right: Any, constants: Any, *args: Any) -> None:
 
 def resultants(**factors: float) -> Callable[[Any], Any]:
     """Multiply some stress resultants."""
-    return lambda found: found | {name: times * found[name] for name, times in factors.items()}
+    return lambda actual: actual | {name: times * actual[name] for name, times in factors.items()}
 
 
 def in_plate_axes(right: Any, laminate: Any) -> Any:

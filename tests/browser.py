@@ -32,9 +32,9 @@ def find_browser() -> str | None:
     A browser that CHROME names and that is absent is an error: who asks for it wants no skip.
     """
     if asked := os.environ.get("CHROME"):
-        found = shutil.which(asked)
-        assert found, f"CHROME={asked}: no such program"
-        return found
+        actual = shutil.which(asked)
+        assert actual, f"CHROME={asked}: no such program"
+        return actual
     return next((path for name in NAMES if (path := shutil.which(name))), None)
 
 
@@ -103,8 +103,8 @@ class Browser:
             assert block, "the browser has ended"
             self._rest += block
         message, self._rest = self._rest.split(b"\0", 1)
-        found: dict[str, Any] = json.loads(message)
-        return found
+        actual: dict[str, Any] = json.loads(message)
+        return actual
 
     def open(
         self, page: Path, *, width: int = 1400, scheme: str = "light", media: str = "screen"

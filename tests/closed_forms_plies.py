@@ -39,7 +39,7 @@ def shear_stresses(
     They balance the stresses of strains and curvatures with the derivatives `by_x` and `by_y`, (6,)
     each.
     """
-    found: list[tuple[Polynomial, Polynomial]] = []
+    actual: list[tuple[Polynomial, Polynomial]] = []
     reached = [0.0, 0.0]
     for low, high, angle in plies(angles, h):
         q = turned_stiffness(ply, angle)
@@ -50,8 +50,8 @@ def shear_stresses(
         slopes = -change(0, by_x) - change(2, by_y), -change(2, by_x) - change(1, by_y)
         xz, yz = (s.integ(1, [k], lbnd=low) for s, k in zip(slopes, reached, strict=True))
         reached = [float(xz(high)), float(yz(high))]
-        found.append((xz, yz))
-    return found
+        actual.append((xz, yz))
+    return actual
 
 
 def equilibrium_shear(ply: Ply, angles: Sequence[float], h: float) -> Floats:
@@ -186,8 +186,8 @@ def residual_stresses() -> tuple[float, ...]:
             z = (low + high) / 2.0 + point / math.sqrt(3.0) * (high - low) / 2.0
             weighted.append(root @ np.hstack([np.eye(3), z / h * np.eye(3)]))
             wanted.append(root @ free * dt)
-    found = np.linalg.lstsq(np.vstack(weighted), np.concatenate(wanted), rcond=None)[0]
-    strain, curvature = found[:3], found[3:] / h
+    actual = np.linalg.lstsq(np.vstack(weighted), np.concatenate(wanted), rcond=None)[0]
+    strain, curvature = actual[:3], actual[3:] / h
     q = turned_stiffness(COOLED, 0.0)
     lower, upper = (q @ (strain + z * curvature - ALPHA * dt) for z in (-h / 2.0, 0.0))
     common = -100.0 * q[:, :2].sum(axis=0)[:2] @ ALPHA[:2] / q[:2, :2].sum()
@@ -217,10 +217,10 @@ def inclined_failure() -> list[float]:
         steps = np.linspace(0.0, math.pi / 2.0, 181)
         best = float(steps[np.argmax([exposure(angle) for angle in steps])])
         around = (best - 0.02, best + 0.02)
-        found = minimize_scalar(
+        actual = minimize_scalar(
             lambda a: -exposure(a), bounds=around, method="bounded", options={"xatol": 1e-9}
         )
-        return exposure(float(found.x))
+        return exposure(float(actual.x))
 
     resistance = brentq(lambda one: largest(-yc, 0.0, one) - 1.0, 20.0, 200.0, xtol=1e-12)
     pressed = ((-180.0, 0.0), (-180.0, 60.0), (-150.0, -80.0))

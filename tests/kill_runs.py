@@ -39,8 +39,8 @@ SWEPT = small(PROGRAM.replace(".5E-6", ".2E-6").replace("LOOP         10", "LOOP
 
 def stretching() -> str:
     """A deck of a plate that stretches as it bends, with as many steps and stored rows."""
-    made = struck_rectangle("cross_ss_immovable", 12, 1667.3332, 3.6e-3)
-    return with_rows(made, 100).to_text()
+    built = struck_rectangle("cross_ss_immovable", 12, 1667.3332, 3.6e-3)
+    return with_rows(built, 100).to_text()
 
 
 def status_or_kill(command: list[str], folder: Path, seconds: float | None) -> int | None:

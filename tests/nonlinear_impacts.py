@@ -35,27 +35,27 @@ SUPPORTS = {
 }
 
 
-def with_time_step(made: Deck, end: float, program: str) -> Deck:
+def with_time_step(deck: Deck, end: float, program: str) -> Deck:
     """Add a program of as many steps as reach a time; {dt} and {steps} stand in its text."""
-    dt = rounded_time_step(critical_time_step(build_plate(made, generate(made))))
+    dt = rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
     text = program.format(dt=repr(dt), steps=round(end / dt))
-    return replace(made, macros=decks.program(text))
+    return replace(deck, macros=decks.program(text))
 
 
 IMPACT = "LMAS DT={dt} LOOP={steps} TIME RODP={steps} NEXT"
 
 
-def with_rows(made: Deck, every: int) -> Deck:
+def with_rows(deck: Deck, every: int) -> Deck:
     """The same impact with strains and displacements stored every so many steps."""
-    *before, row, end = made.macros
+    *before, row, end = deck.macros
     rows = (replace(row, value=float(every)), Macro("DISP", value=float(every)))
-    return replace(made, macros=(*before, *rows, end))
+    return replace(deck, macros=(*before, *rows, end))
 
 
-def without_nonlinearity(made: Deck) -> Deck:
+def without_nonlinearity(deck: Deck) -> Deck:
     """The same deck of a linear plate."""
-    kept = tuple(s for s in made.segments if not isinstance(s, model.Nonlinear))
-    return replace(made, segments=kept)
+    kept = tuple(s for s in deck.segments if not isinstance(s, model.Nonlinear))
+    return replace(deck, segments=kept)
 
 
 def struck_rectangle(case: str, n: int, velocity: float, end: float) -> Deck:
@@ -169,5 +169,5 @@ def struck_disc(edges: str, core: int, rings: int, velocity: float, end: float) 
         model.Nonlinear(),
         decks.material(ISOTROPIC, [0.0], 2.0),
     )
-    made = Deck("disc", model.Control(len(places), len(elements), 1, 2, 5, 9), segments, ())
-    return with_time_step(made, end, IMPACT)
+    built = Deck("disc", model.Control(len(places), len(elements), 1, 2, 5, 9), segments, ())
+    return with_time_step(built, end, IMPACT)

@@ -102,10 +102,10 @@ def read_page(html: str) -> Page:
 def agrees(cell: Cell) -> bool:
     """Whether the number of a cell is the one that its text shows, up to a prefix of its unit."""
     assert cell.value is not None
-    found = NUMBER.search(cell.text)
-    assert found is not None, cell
-    said, value = float(found[0]), cell.value
-    digits = len(re.sub(r"e.*|\D", "", found[0]).lstrip("0"))
+    actual = NUMBER.search(cell.text)
+    assert actual is not None, cell
+    said, value = float(actual[0]), cell.value
+    digits = len(re.sub(r"e.*|\D", "", actual[0]).lstrip("0"))
     powers = [0, -2, *PREFIXES.values()]  # per cent too
     tolerance = 0.5000001 * 10.0 ** (1 - digits) if digits > 1 else 0.5000001
     return value == said == 0.0 or any(

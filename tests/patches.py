@@ -105,11 +105,11 @@ def free_stiffness(mesh: tuple[Floats, Ints], bending: int = 3, shear: int = 3) 
 
 def reference_frequencies(ks: str) -> Floats:
     """Flexural frequencies of the simply supported square plate, h/a = 0.1, with multiplicity."""
-    found: list[float] = []
+    actual: list[float] = []
     for row in table("freq_ssss_mindlin.csv"):
         if f"h/a=0.1 ks={ks}" in row["case"]:
-            found += [float(row["omega_flex_rad/s_or_nondim"])] * (1 + (row["m"] != row["n"]))
-    return np.sort(found)
+            actual += [float(row["omega_flex_rad/s_or_nondim"])] * (1 + (row["m"] != row["n"]))
+    return np.sort(actual)
 
 
 def reference_deflections(ratio: float, ks: str) -> tuple[float, float]:

@@ -89,12 +89,12 @@ def test_the_summary_of_a_deck_with_absurd_numbers_warns_of_nothing_in_numpys_wo
 def test_a_time_step_that_rounding_would_swallow_is_an_error_at_its_place(
     dt: str, code: str
 ) -> None:
-    found = load_deck(small(PROGRAM.replace("DT        .5E-6", f"DT,{dt}"))).errors()
-    assert [finding.code for finding in found] == ([code] if code else [])
-    assert all(f.place is not None and f.place.field.endswith("value") for f in found)
+    actual = load_deck(small(PROGRAM.replace("DT        .5E-6", f"DT,{dt}"))).errors()
+    assert [finding.code for finding in actual] == ([code] if code else [])
+    assert all(f.place is not None and f.place.field.endswith("value") for f in actual)
 
 
 @pytest.mark.parametrize("card", ["3,0,1E-300,3.E7,.0006875", "3,0,1E300,3.E7,.0006875"])
 def test_a_rod_beyond_the_range_of_numbers_is_an_error(card: str) -> None:
-    found = load_deck(DECK.replace("    3    0       1.0     30.E6 .0006875", card)).errors()
-    assert [finding.code for finding in found] == ["E429"]
+    actual = load_deck(DECK.replace("    3    0       1.0     30.E6 .0006875", card)).errors()
+    assert [finding.code for finding in actual] == ["E429"]

@@ -36,18 +36,20 @@ def documented(page: str) -> dict[str, tuple[Any, str]]:
     return by_name
 
 
-def shown(found: Any, options: str) -> Iterator[Any]:
+def shown(actual: Any, options: str) -> Iterator[Any]:
     """What the page shows with a signature: a function, or a class and its members."""
-    if inspect.isfunction(found):
-        yield found
+    if inspect.isfunction(actual):
+        yield actual
         return
     # A class of fields has their annotations itself.
-    yield found.__init__ if inspect.isfunction(found.__init__) else found
+    yield actual.__init__ if inspect.isfunction(actual.__init__) else actual
     if "__call__" in options:
-        yield found.__call__
+        yield actual.__call__
     if not (asked := re.search(":members:(.*)", options)):
         return
-    members = inspect.getmembers(found) if ":inherited-members:" in options else vars(found).items()
+    members = (
+        inspect.getmembers(actual) if ":inherited-members:" in options else vars(actual).items()
+    )
     names = [name.strip() for name in asked[1].split(",") if name.strip()]
     for name, value in members:
         function = inspect.unwrap(getattr(value, "fget", None) or getattr(value, "__func__", value))
@@ -58,14 +60,14 @@ def shown(found: Any, options: str) -> Iterator[Any]:
 @cache
 def named_in(module: str) -> dict[str, type]:
     """Own classes that annotations of a module may name, also those imported for types alone."""
-    found = dict(vars(import_module(module)))
+    actual = dict(vars(import_module(module)))
     for node in ast.walk(ast.parse(inspect.getsource(import_module(module)))):
         if isinstance(node, ast.ImportFrom) and str(node.module).startswith("fecm"):
             home = import_module(str(node.module))
-            found |= {name.asname or name.name: getattr(home, name.name) for name in node.names}
+            actual |= {name.asname or name.name: getattr(home, name.name) for name in node.names}
     return {
         name: one
-        for name, one in found.items()
+        for name, one in actual.items()
         if inspect.isclass(one) and one.__module__.startswith("fecm")
     }
 

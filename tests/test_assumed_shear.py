@@ -86,11 +86,11 @@ def test_stored_strains_are_those_of_the_stiffness(kind: int, rule: object) -> N
     assert isinstance(rule, type(gauss(2)))
     coordinates, elements = distorted_square(3, 2, kind)
     field = np.random.default_rng(3).normal(size=(2, len(coordinates), 5))
-    found = StrainField(elements, coordinates, rule, assumes_shear=True).evaluate(field)
+    actual = StrainField(elements, coordinates, rule, assumes_shear=True).evaluate(field)
     (family,) = element_blocks(elements, coordinates)
     q = field[:, family.nodes].reshape(2, len(elements), -1)
     expected = np.einsum("epij,fej->ifep", strain_matrix(family, rule), q)
-    np.testing.assert_allclose(found[[4, 3]], expected, atol=1e-12)
+    np.testing.assert_allclose(actual[[4, 3]], expected, atol=1e-12)
 
 
 # Patch tests -------------------------------------------------------------------------------------
@@ -116,9 +116,9 @@ def test_constant_transverse_shear_strains_are_exact_on_every_straight_sided_mes
     kind: int, maker: MeshMaker
 ) -> None:
     mesh = maker(3, 4, kind)
-    found = StrainField(mesh[1], mesh[0], gauss(3), assumes_shear=True).evaluate(sheared(mesh[0]))
-    np.testing.assert_allclose(found[4], 0.7, atol=1e-13)
-    np.testing.assert_allclose(found[3], -0.4, atol=1e-13)
+    actual = StrainField(mesh[1], mesh[0], gauss(3), assumes_shear=True).evaluate(sheared(mesh[0]))
+    np.testing.assert_allclose(actual[4], 0.7, atol=1e-13)
+    np.testing.assert_allclose(actual[3], -0.4, atol=1e-13)
 
 
 @pytest.mark.parametrize("maker", [parallelograms, distorted_square])

@@ -137,7 +137,7 @@ def test_a_mesh_is_obeyed_whatever_the_radius_of_the_patch(options: list[str]) -
     assert fecm.read_one(narrow.stdout).control.numel == 6 * 4
     assert "at the patch" not in wide.stderr
     assert "is larger than the radius of the patch, 0.01" in narrow.stderr  # W447
-    wide_mesh, narrow_mesh = (generate(fecm.read_one(made.stdout)) for made in (wide, narrow))
+    wide_mesh, narrow_mesh = (generate(fecm.read_one(built.stdout)) for built in (wide, narrow))
     np.testing.assert_array_equal(wide_mesh.coordinates, narrow_mesh.coordinates)
 
 
@@ -155,9 +155,9 @@ def test_a_side_is_refined_to_what_is_asked_and_not_much_further(
     length: float, count: int, part: float, share: float
 ) -> None:
     side = share * length / count
-    made = refined_sections(length, count, part * length, 1.0, side)
-    assert count <= len(made) < count * (1.0 - np.log(share)) + 8
-    assert longest_at(made, part * length) <= side
+    built = refined_sections(length, count, part * length, 1.0, side)
+    assert count <= len(built) < count * (1.0 - np.log(share)) + 8
+    assert longest_at(built, part * length) <= side
 
 
 def test_a_named_ply_is_converted_between_systems_of_units() -> None:

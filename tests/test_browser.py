@@ -118,8 +118,8 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     program = find_browser()
     if program is None:
         pytest.skip("no Chromium or Chrome found")
-    with Browser(program, tmp_path_factory.mktemp("profile")) as found:
-        yield found
+    with Browser(program, tmp_path_factory.mktemp("profile")) as actual:
+        yield actual
 
 
 def contrast(text: str, paper: str) -> float:

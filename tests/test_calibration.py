@@ -66,8 +66,8 @@ def test_the_command_prints_the_sensitivity_for_persons_and_for_programs(tmp_pat
     options = (path, "--mass", MASS, "--c-a", C_A)
     document = json.loads(call("rod", "calibrate", *options, "--format", "json").stdout)
     assert abs(document["sensitivity"] - C_F) < 3 * document["sensitivity_error"]
-    told = call("rod", "calibrate", *options).stdout.splitlines()
-    assert told[-1].startswith(f"sensitivity c_F   {document['sensitivity']:.6g} ± ")
+    text = call("rod", "calibrate", *options).stdout.splitlines()
+    assert text[-1].startswith(f"sensitivity c_F   {document['sensitivity']:.6g} ± ")
 
 
 @pytest.mark.parametrize(

@@ -33,8 +33,8 @@ def test_a_decimal_comma_is_named(edit: Edit, card: str) -> None:
 
 
 def test_a_letter_on_a_card_of_full_columns_is_not_taken_for_missing_commas() -> None:
-    found = errors("FECM\n12345 1234  1x2 2345 1234 1234\n")
-    (error,) = (one for one in found if one.code == "E101")
+    actual = errors("FECM\n12345 1234  1x2 2345 1234 1234\n")
+    (error,) = (one for one in actual if one.code == "E101")
     assert "commas" not in error.hint
 
 

@@ -333,9 +333,9 @@ def test_one_or_two_nodes_that_hold_w_are_no_support(cards: str, code: str) -> N
 
 def test_a_contact_too_stiff_for_the_time_step_is_found_before_the_run() -> None:
     base = (DATA / "plate-100x100x2.inp").read_text()
-    for k, found in (("  100000.0", False), ("       4E6", False), ("       1E7", True)):
+    for k, actual in (("  100000.0", False), ("       4E6", False), ("       1E7", True)):
         text = base.replace("  100000.0     0.017", f"{k}     0.017")
-        assert ("W517" in codes(text)) is found
+        assert ("W517" in codes(text)) is actual
 
 
 def test_impact_steps_beside_central_differences_are_warned_of() -> None:
@@ -372,9 +372,9 @@ def test_a_run_says_how_many_fewer_steps_the_time_step_of_dt_0_takes(tmp_path: P
     assert "time step" not in shown  # above half of the critical one
     (tmp_path / "small.inp").write_text(small(PROGRAM.replace(".5E-6", ".5E-7")))
     shown = call("run", "small.inp", "--overwrite", cwd=tmp_path).stdout
-    found = re.search(r"at most (\S+) of the .* DT 0 takes at least (\S+): (\S+) times", shown)
-    assert found is not None
-    share, taken, fewer = map(float, found.groups())
+    actual = re.search(r"at most (\S+) of the .* DT 0 takes at least (\S+): (\S+) times", shown)
+    assert actual is not None
+    share, taken, fewer = map(float, actual.groups())
     critical = load_deck(tmp_path / "small.inp").problems[0].critical_time_step
     assert 0.9 * share < 0.5e-7 / critical < share
     assert 0.8 * critical < taken < 0.9 * critical

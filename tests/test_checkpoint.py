@@ -260,10 +260,10 @@ def altered(path: Path, change: str) -> None:
             line += b'"shape": [-1]}\n' + b"[" * 100_000 + b"\n"
             spool_of(path).write_bytes(line)
             about["spool"] = {"length": len(line), "checksum": zlib.crc32(line)}
-    told = np.frombuffer((text or json.dumps(about)).encode(), np.uint8)
+    message = np.frombuffer((text or json.dumps(about)).encode(), np.uint8)
     pack = np.savez_compressed if change == "compressed" else np.savez
     with checkpoint_of(path).open("wb") as file:
-        pack(file, about=told, **arrays)
+        pack(file, about=message, **arrays)
 
 
 @pytest.mark.parametrize(

@@ -56,8 +56,8 @@ def test_a_late_measurement_is_correlated_as_the_cosine_of_its_delay() -> None:
     whole = fecm.Result(
         {"history/time": time[1:], "history/force": np.sin(2.0 * np.pi * time[1:])}, {}, {}
     )
-    found = whole.compare((time, np.sin(2.0 * np.pi * time - 0.3)))
-    assert found.correlation == pytest.approx(math.cos(0.3), abs=1e-3)
+    actual = whole.compare((time, np.sin(2.0 * np.pi * time - 0.3)))
+    assert actual.correlation == pytest.approx(math.cos(0.3), abs=1e-3)
 
 
 def test_a_delay_and_an_offset_of_the_measurement_are_subtracted() -> None:

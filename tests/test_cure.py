@@ -58,10 +58,10 @@ def residual(plate: LaminateSection, dt: float, free: Expansion = ALPHA) -> Resi
 
 def cases() -> dict[tuple[str, float], list[dict[str, str]]]:
     """Rows of each laminate and change of temperature."""
-    found: dict[tuple[str, float], list[dict[str, str]]] = {}
+    actual: dict[tuple[str, float], list[dict[str, str]]] = {}
     for row in table("thermal_stress.csv"):
-        found.setdefault((row["case"], float(row["dT_K"])), []).append(row)
-    return found
+        actual.setdefault((row["case"], float(row["dT_K"])), []).append(row)
+    return actual
 
 
 CASES = cases()
@@ -77,14 +77,14 @@ def plate_of(rows: list[dict[str, str]]) -> LaminateSection:
 @pytest.mark.parametrize(("name", "dt"), CASES)
 def test_residual_stresses_are_those_of_the_least_energy(name: str, dt: float) -> None:
     rows = CASES[name, dt]
-    found = residual(plate_of(rows), dt)
+    actual = residual(plate_of(rows), dt)
     expected = np.array([[float(row[f"{s}_Pa"]) for s in ("s1", "s2", "t12")] for row in rows])
     atol = 1e-9 * np.abs(expected).max()
-    np.testing.assert_allclose(found.stresses.reshape(-1, 3), expected, rtol=0.0, atol=atol)
+    np.testing.assert_allclose(actual.stresses.reshape(-1, 3), expected, rtol=0.0, atol=atol)
     strain = [float(rows[0][key]) for key in ("eps0_x", "eps0_y", "gamma0_xy")]
-    np.testing.assert_allclose(found.strain, strain, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(actual.strain, strain, rtol=1e-9, atol=1e-15)
     curvature = [float(rows[0][key]) for key in ("kx_1/m", "ky_1/m", "kxy_1/m")]
-    np.testing.assert_allclose(found.curvature, curvature, rtol=1e-9, atol=1e-13)
+    np.testing.assert_allclose(actual.curvature, curvature, rtol=1e-9, atol=1e-13)
 
 
 @pytest.mark.parametrize("layup", ["[0/90]", "[45/0/-45/90]4s", "[30/-20/75/10]", "[0]4"])
@@ -360,8 +360,8 @@ def test_cases_that_differ_in_the_cure_alone_share_their_motion(
     options = ("--random", "cure_dT=normal:-3,1", "--samples", "16", "--measure", "failure")
     done = call("sweep", "d.inp", *options, "-o", "s.h5", cwd=tmp_path)
     assert done.exit_code == 0, done.stderr
-    told = "16 draws are run in full; those that differ only in cure_dT, together"
-    assert told in done.stderr
+    text = "16 draws are run in full; those that differ only in cure_dT, together"
+    assert text in done.stderr
     assert len(runs) == 1
     swept = fecm.load_sweep(tmp_path / "s.h5")
     assert len(set(swept["exposure_tsai_wu"])) == 16

@@ -47,15 +47,15 @@ def test_a_card_gives_radii_and_a_blank_is_infinite(
     text = panel((500.0,), STATIC).to_text()
     deck = fecm.read_one(re.sub("CURV\n.*\n", f"CURV\n{card}\n", text))
     (problem,) = load_deck(deck).problems
-    found = deck.require(model.Curvature)
-    assert (found.radius_x, found.radius_y, found.radius_xy) == radii
+    actual = deck.require(model.Curvature)
+    assert (actual.radius_x, actual.radius_y, actual.radius_xy) == radii
     wanted = tuple(1.0 / radius if radius else 0.0 for radius in radii)
-    assert found.curvatures == problem.plate.curvature == wanted
+    assert actual.curvatures == problem.plate.curvature == wanted
 
 
 def test_listing_mode_refuses_the_card() -> None:
-    found = load_deck(panel((500.0,), STATIC).to_text(), "listing").errors()
-    assert "The printed program has no CURV." in [finding.message for finding in found]
+    actual = load_deck(panel((500.0,), STATIC).to_text(), "listing").errors()
+    assert "The printed program has no CURV." in [finding.message for finding in actual]
 
 
 # Findings ----------------------------------------------------------------------------------------
@@ -90,13 +90,13 @@ def test_the_rise_is_told_in_numbers() -> None:
 def test_a_radius_near_the_thickness_is_no_thin_shell() -> None:
     thick = decks.material(decks.isotropic(70e3, 0.3, 2.7e-9), (0.0,), 30.0)
 
-    def made(radius: float) -> model.Deck:
+    def thick_panel(radius: float) -> model.Deck:
         deck = panel((0.0, radius), STATIC, load=1.0)
         segments = (thick if isinstance(s, model.Material) else s for s in deck.segments)
         return replace(deck, control=replace(deck.control, layers=1), segments=tuple(segments))
 
-    assert "Ry of CURV is 19.7 times the thickness" in findings(made(-590.0))["W525"].message
-    assert "W525" not in findings(made(610.0))
+    assert "Ry of CURV is 19.7 times the thickness" in findings(thick_panel(-590.0))["W525"].message
+    assert "W525" not in findings(thick_panel(610.0))
 
 
 @pytest.mark.parametrize(
@@ -127,8 +127,8 @@ def test_a_line_of_symmetry_must_not_move_across_itself() -> None:
 def test_a_preload_must_run_along_straight_lines(
     forces: tuple[float, float, float], refused: bool
 ) -> None:
-    made = panel((0.0, 500.0), STATIC, load=1.0, others=(model.Preload(*forces),))
-    assert ("E528" in findings(made)) == refused
+    built = panel((0.0, 500.0), STATIC, load=1.0, others=(model.Preload(*forces),))
+    assert ("E528" in findings(built)) == refused
     assert refused == (forces[1] != 0.0)
 
 

@@ -85,13 +85,13 @@ def held(deck: Deck) -> dict[str, set[str]]:
 def test_edges_of_a_curved_panel_hold_what_their_support_says(
     given: dict[str, Any], left: set[str], bottom: set[str]
 ) -> None:
-    found = held(panel(radius_x=100.0, **given))
-    assert found == {"left": left, "bottom": bottom, "inside": set()}
+    actual = held(panel(radius_x=100.0, **given))
+    assert actual == {"left": left, "bottom": bottom, "inside": set()}
 
 
 def test_pinned_edges_of_a_nonlinear_plate_hold_both_displacements() -> None:
-    found = held(panel(support="pinned", nonlinear=True, in_plane="free"))
-    assert found == {"left": {"u", "v"}, "bottom": {"u", "v"}, "inside": set()}
+    actual = held(panel(support="pinned", nonlinear=True, in_plane="free"))
+    assert actual == {"left": {"u", "v"}, "bottom": {"u", "v"}, "inside": set()}
 
 
 def test_the_command_writes_the_deck_of_the_function_and_says_what_the_edges_hold(
@@ -104,9 +104,9 @@ def test_the_command_writes_the_deck_of_the_function_and_says_what_the_edges_hol
         "the panel is curved (CURV): in its plane simple edges hold the displacement along the "
         "edge (SS3); --support pinned holds both"
     ) in done.stderr
-    made = fecm.read_one(path)
-    assert made == panel(patch="auto", radius_x=-100.0, radius_y=250.0)
-    assert made.require(Curvature).curvatures == (-0.01, 0.004, 0.0)
+    built = fecm.read_one(path)
+    assert built == panel(patch="auto", radius_x=-100.0, radius_y=250.0)
+    assert built.require(Curvature).curvatures == (-0.01, 0.004, 0.0)
 
 
 def test_a_flat_deck_is_that_of_before(tmp_path: Path) -> None:

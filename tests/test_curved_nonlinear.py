@@ -80,16 +80,16 @@ def test_an_arch_snaps_through_along_the_exact_curve() -> None:
     plate = strip(12)
     load, weights = pressure(plate), np.zeros(len(plate.mesh.coordinates))
     weights[np.hypot(*plate.mesh.coordinates.T).argmin()] = 1.0
-    field, found = None, []
+    field, actual = None, []
     deflections = np.arange(1.0, 6.1)
     for deflection in deflections:
         state = equilibrium(plate, load, weights, deflection, field)
         field = state.field
-        found.append(state.load)
+        actual.append(state.load)
     wanted = [arch(deflection) for deflection in deflections]
     largest = max(wanted[:3])
     assert min(wanted) < -0.1 * largest  # it does snap through
-    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-5 * largest)
+    np.testing.assert_allclose(actual, wanted, rtol=0.0, atol=1e-5 * largest)
 
 
 # A roof ------------------------------------------------------------------------------------------
@@ -127,16 +127,16 @@ def test_a_hinged_roof_carries_the_published_load(thickness: float, limit: float
 
 @pytest.mark.long
 def test_an_estimate_of_a_panel_that_snaps_through_ends_at_the_load_that_it_carries() -> None:
-    def found(radius: float, velocity: float) -> QuickEstimate:
+    def estimate(radius: float, velocity: float) -> QuickEstimate:
         deck = struck((0.0, radius), mesh(5), 5e-7, 10, others=(NONL,), velocity=velocity)
         return quick_estimate(load_deck(deck).problems[0])
 
-    snapped = found(-500.0, 15000.0)
+    snapped = estimate(-500.0, 15000.0)
     assert [one.name for one in snapped.models] == ["infinite plate", "static plate"]
     (limit,) = re.findall(r"the panel snaps through at the force ([\d.]+)", snapped.remark)
-    slower = [found(-500.0, velocity).models[-1].impact.peak for velocity in (3000.0, 9000.0)]
+    slower = [estimate(-500.0, velocity).models[-1].impact.peak for velocity in (3000.0, 9000.0)]
     assert slower[0] < slower[1] < 1.001 * float(limit)
-    assert found(500.0, 15000.0).models[-1].name == "nonlinear static plate"
+    assert estimate(500.0, 15000.0).models[-1].name == "nonlinear static plate"
 
 
 # Stresses ----------------------------------------------------------------------------------------
@@ -178,11 +178,11 @@ def test_small_deflections_are_those_of_the_linear_panel() -> None:
 def test_a_panel_struck_hard_keeps_its_energy_and_softens_or_stiffens_by_its_side() -> None:
     outside, inside = (stretched(radius, 60000.0) for radius in (-500.0, 500.0))
     energy = 0.5 * 2e-5 * 60000.0**2
-    for found in (outside, inside):
-        assert np.abs(found.energy.balance_error).max() < 1e-4 * energy
-        rows = np.searchsorted(found.energy.step, found.membrane.step)
+    for actual in (outside, inside):
+        assert np.abs(actual.energy.balance_error).max() < 1e-4 * energy
+        rows = np.searchsorted(actual.energy.step, actual.membrane.step)
         np.testing.assert_allclose(
-            found.membrane.strain_energy, found.energy.plate_strain[rows], rtol=1e-9
+            actual.membrane.strain_energy, actual.energy.plate_strain[rows], rtol=1e-9
         )
     assert outside.history.plate_w.max() > 1.02 * inside.history.plate_w.max()
     assert inside.history.plate_w.max() > curved_panels.THICKNESS

@@ -42,9 +42,9 @@ def by_panel(*at_once: tuple[float, float]) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("radii", [*at_once, *long])
 
 
-def mean_deflection(found: Result) -> float:
+def mean_deflection(result: Result) -> float:
     """Deflection under the patch."""
-    return float(found.tape3.w[0, found["patch/node"] - 1] @ found["patch/weight"])
+    return float(result.tape3.w[0, result["patch/node"] - 1] @ result["patch/weight"])
 
 
 # Statics and frequencies --------------------------------------------------------------------------
@@ -154,7 +154,7 @@ def test_a_twisted_panel_is_a_saddle_turned_by_45_degrees() -> None:
     corner = 50.0 * np.sqrt(2.0)
     straight = ElementGrid(uniform_section(100.0, 8), uniform_section(100.0, 8))
 
-    def made(points: Floats, radii: tuple[float, ...]) -> float:
+    def deflection(points: Floats, radii: tuple[float, ...]) -> float:
         cards = tuple(model.NodeValues(n, 0, tuple(p)) for n, p in enumerate(points.tolist(), 1))
         segments = (
             decks.restraints(straight, "00000 11100 11100 11100 11100"),
@@ -169,9 +169,12 @@ def test_a_twisted_panel_is_a_saddle_turned_by_45_degrees() -> None:
     s, t = np.meshgrid(np.linspace(-1.0, 1.0, 17), np.linspace(-1.0, 1.0, 17))
     square = 50.0 * np.stack([s.ravel(), t.ravel()], axis=1)
     diamond = corner / 2.0 * np.stack([(s - t).ravel(), (s + t).ravel()], axis=1)
-    twisted, saddle = made(square, (0.0, 0.0, 400.0)), made(diamond, (400.0, -400.0, 0.0))
+    twisted, saddle = (
+        deflection(square, (0.0, 0.0, 400.0)),
+        deflection(diamond, (400.0, -400.0, 0.0)),
+    )
     assert twisted == pytest.approx(saddle, rel=1e-4)
-    assert twisted < 0.9 * made(square, ())
+    assert twisted < 0.9 * deflection(square, ())
 
 
 # Interplay ----------------------------------------------------------------------------------------
@@ -244,12 +247,12 @@ def test_a_sweep_has_the_forces_of_its_runs() -> None:
 
 
 def test_a_layup_sweep_keeps_the_curvature() -> None:
-    made = shortly((0.0, -500.0))
-    swept = swept_forces(made, {"layup": ["[0/90/0/90/0]s", "[90/0/90/0/90]s"]})
+    built = shortly((0.0, -500.0))
+    swept = swept_forces(built, {"layup": ["[0/90/0/90/0]s", "[90/0/90/0/90]s"]})
     turned = tuple(90.0 - angle for angle in ANGLES)
     material = decks.material(curved_panels.PLY, turned, 0.2)
-    segments = tuple(material if isinstance(s, model.Material) else s for s in made.segments)
-    for force, one in zip(swept, (made, replace(made, segments=segments)), strict=True):
+    segments = tuple(material if isinstance(s, model.Material) else s for s in built.segments)
+    for force, one in zip(swept, (built, replace(built, segments=segments)), strict=True):
         run = fecm.run_one(one)
         close = 1e-11 * run.history.force.max()
         np.testing.assert_allclose(force, run.history.force, rtol=0.0, atol=close)

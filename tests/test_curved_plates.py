@@ -97,12 +97,12 @@ def test_strains_and_resultants_contain_the_strains_of_the_radii() -> None:
     points = plate.strain_field(gauss(2))
     field = lifted(plate)
     of_w = strains_of_deflection(plate, points, field)
-    found = strains_and_resultants(points, plate.rows_by_laminate, field, (0.0, 0.0, 0.0), of_w)
+    actual = strains_and_resultants(points, plate.rows_by_laminate, field, (0.0, 0.0, 0.0), of_w)
     strain = STRAIN + 0.4 * strain_of_deflection(BENT)
     N, M = plate.laminate.A @ strain, plate.laminate.B @ strain
     names = ("eps_xx", "eps_yy", "gamma_xy", "N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy")
     for name, value in zip(names, [*strain, *N, *M], strict=True):
-        np.testing.assert_allclose(found[name], value, rtol=1e-10, err_msg=name)
+        np.testing.assert_allclose(actual[name], value, rtol=1e-10, err_msg=name)
     flat = replace(plate, curvature=FLAT)
     assert strains_of_deflection(flat, points, field) is None
 
@@ -115,10 +115,10 @@ def test_a_gage_reads_the_strain_of_the_radii_in_its_direction(direction: float)
     gage_cards = gages(plate.mesh, [gage], curvature=plate.curvature)
     c, s = np.cos(np.deg2rad(direction)), np.sin(np.deg2rad(direction))
     strain = STRAIN + 0.4 * strain_of_deflection(BENT)
-    found = gage_cards.strains(
+    actual = gage_cards.strains(
         (field.ravel()[gage_cards.dof_indices] * gage_cards.weights).sum(axis=1)
     )
-    assert found[0] == pytest.approx(np.array([c * c, s * s, c * s]) @ strain, rel=1e-10)
+    assert actual[0] == pytest.approx(np.array([c * c, s * s, c * s]) @ strain, rel=1e-10)
 
 
 def test_ply_stresses_have_the_strains_of_the_radii_and_their_derivatives() -> None:
@@ -170,8 +170,8 @@ def test_the_kernels_have_the_forces_of_numpy(odd: bool) -> None:
                 size = np.abs(wanted).max()
                 flat = stiffness_operator(replace(plate, curvature=FLAT), "numpy", kept)(u)
                 assert np.abs(flat - wanted).max() > 1e-6 * size
-                found = CompiledProduct(plate, kept)(u)
-                np.testing.assert_allclose(found, wanted, rtol=0.0, atol=5e-15 * size)
+                actual = CompiledProduct(plate, kept)(u)
+                np.testing.assert_allclose(actual, wanted, rtol=0.0, atol=5e-15 * size)
 
 
 def test_u_and_v_of_a_curved_panel_are_not_at_rest() -> None:

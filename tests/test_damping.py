@@ -113,23 +113,23 @@ def test_the_critical_time_step_is_that_without_damping(factor: float) -> None:
 
 def test_what_damping_dissipates_is_what_the_plate_loses() -> None:
     a = 0.1
-    plain, found = run(released(0.0, 0.02, 600)), run(released(a, 0.02, 600))
-    initial = found.energy.attributes["initial"]
-    for result in (plain, found):
+    plain, actual = run(released(0.0, 0.02, 600)), run(released(a, 0.02, 600))
+    initial = actual.energy.attributes["initial"]
+    for result in (plain, actual):
         assert np.abs(result.energy.balance_error).max() < 2e-4 * initial
     # Of a mode: E(t)/E(0) from u and u' of the closed form.
-    t, w_d = found.energy.time, np.sqrt(OMEGA**2 - a**2 / 4.0)
+    t, w_d = actual.energy.time, np.sqrt(OMEGA**2 - a**2 / 4.0)
     speed = np.exp(-a * t / 2.0) * OMEGA**2 / w_d * np.sin(w_d * t)
     left = free_decay(t, OMEGA, a) ** 2 + (speed / OMEGA) ** 2
-    np.testing.assert_allclose(found.energy.damping_work / initial, 1.0 - left, atol=0.01)
-    assert (np.diff(found.energy.damping_work) >= 0.0).all()
+    np.testing.assert_allclose(actual.energy.damping_work / initial, 1.0 - left, atol=0.01)
+    assert (np.diff(actual.energy.damping_work) >= 0.0).all()
 
 
 def test_a_damped_impact_keeps_its_energy_balance() -> None:
-    plain, found = run(STEPS), run(damped(STEPS, "2e4,"))
+    plain, actual = run(STEPS), run(damped(STEPS, "2e4,"))
     initial = plain.energy.attributes["initial"]
-    assert found.energy.damping_work[-1] > 1e-2 * initial
-    errors = [np.abs(result.energy.balance_error).max() for result in (plain, found)]
+    assert actual.energy.damping_work[-1] > 1e-2 * initial
+    errors = [np.abs(result.energy.balance_error).max() for result in (plain, actual)]
     assert errors[1] < 1.5 * errors[0]
 
 
@@ -163,7 +163,7 @@ def test_a_stopped_damped_run_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
 )
 def test_damping_is_checked(card: str, code: str) -> None:
     codes = [finding.code for finding in load_deck(damped(STEPS, card)).findings]
-    assert any(found.startswith(code) for found in codes)
+    assert any(actual.startswith(code) for actual in codes)
 
 
 def test_the_printed_program_has_no_damping() -> None:

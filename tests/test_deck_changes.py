@@ -185,12 +185,12 @@ ZONED = fecm.impact(
 def test_what_can_not_be_changed_is_refused_by_its_name(
     deck: fecm.Deck | Path, given: Any, message: str | None
 ) -> None:
-    made = deck if isinstance(deck, fecm.Deck) else fecm.read_one(deck)
+    built = deck if isinstance(deck, fecm.Deck) else fecm.read_one(deck)
     if message is None:
-        assert made.with_(**given) != made
+        assert built.with_(**given) != built
         return
     with pytest.raises(ValueError, match=message):
-        made.with_(**given)
+        built.with_(**given)
 
 
 def test_a_quantity_of_pint_is_the_text_that_it_prints() -> None:
@@ -359,8 +359,8 @@ def test_a_program_stores_what_it_is_asked_for_within_the_loop_that_takes_steps(
     deck = fecm.read_one(LONG)
     assert [word for word, *_ in program(deck)][2:] == ["LOOP", "TIME", "RODP", "DISP", "NEXT"]
     steps = deck.macros[2].value
-    made = program(deck.with_program(plies=(50, 4), failure=7, every=9))[4:]
-    assert made == [
+    built = program(deck.with_program(plies=(50, 4), failure=7, every=9))[4:]
+    assert built == [
         ("RODP", 9, 0), ("DISP", 9, 0), ("FAIL", 7, 0), ("PLYS", 50, 4), ("NEXT", 0, 0),
     ]  # fmt: skip
     (word, value, _) = program(deck.with_program(plies=True))[-2]

@@ -105,10 +105,10 @@ def test_warnings_beyond_the_first_thousand_are_counted_and_errors_still_shown()
     for _ in range(MOST + 7):
         findings.add("W106", "Text is not read.")
     findings.add("E101", "This is no number.")
-    found = list(findings)
-    assert len(found) == MOST + 2
+    actual = list(findings)
+    assert len(actual) == MOST + 2
     assert [f.code for f in findings.errors] == ["E101"]
-    assert "7 more warnings" in found[-1].message
+    assert "7 more warnings" in actual[-1].message
 
 
 def test_counting_errors_does_not_take_longer_with_their_number() -> None:
@@ -202,9 +202,9 @@ def test_a_program_longer_than_any_float_is_an_error_with_its_length() -> None:
 
 @pytest.mark.parametrize("card", ["LOOP,1e300", "RODP,1e300", "EIGE,2e9", "DISP,1e18"])
 def test_a_count_beyond_any_program_is_an_error(card: str) -> None:
-    found = load_deck(small(PROGRAM + card + "\n")).errors()
-    assert "E505" in [finding.code for finding in found]
-    assert max(len(finding.message) for finding in found) < 100
+    actual = load_deck(small(PROGRAM + card + "\n")).errors()
+    assert "E505" in [finding.code for finding in actual]
+    assert max(len(finding.message) for finding in actual) < 100
 
 
 # Files -------------------------------------------------------------------------------------------

@@ -82,9 +82,9 @@ def test_an_impact_on_other_elements_has_the_force_of_the_9_node_mesh(
 def findings(text: str) -> list[tuple[str, str, str]]:
     """Code, message and hint of a deck's findings, without those of the small plate."""
     return [
-        (found.code, found.message, found.hint)
-        for found in load_deck(text).findings
-        if found.code not in OWN_FINDINGS
+        (actual.code, actual.message, actual.hint)
+        for actual in load_deck(text).findings
+        if actual.code not in OWN_FINDINGS
     ]
 
 
@@ -144,8 +144,8 @@ def test_a_4_node_element_without_its_fourth_node_is_a_triangle() -> None:
     coordinates, elements = square(2, 2, 4)
     elements[3, 3] = 0
     problem = load_deck(deck((coordinates, elements), (2, 2, 2))).problems[0]
-    found = element_blocks(problem.mesh.elements, problem.mesh.coordinates)
-    names = {tuple(family.rows.tolist()): family.shape.name for family in found}
+    actual = element_blocks(problem.mesh.elements, problem.mesh.coordinates)
+    names = {tuple(family.rows.tolist()): family.shape.name for family in actual}
     assert names == {(0, 1, 2): "quadrilateral", (3,): "triangle"}
 
 
@@ -179,5 +179,5 @@ def test_a_triangles_missing_corner_is_no_side_of_it() -> None:
 def test_elements_have_3_to_12_nodes(nodes: int, right: bool) -> None:
     lines = deck(square(1, 1, 4), (2, 2, 2)).splitlines()
     lines[1] = f"4,1,2,2,5,{nodes}"
-    messages = [found.message for found in load_deck("\n".join(lines) + "\n").findings]
+    messages = [actual.message for actual in load_deck("\n".join(lines) + "\n").findings]
     assert (f"NEN is {nodes}; it must be 3 to 12." in messages) is not right

@@ -131,10 +131,10 @@ def test_consistent_mass_of_small_elements_is_that_of_textbooks(
     M = element_matrices.consistent_mass(family, isotropic_plate(0.2), gauss(2))
     assert M.shape == (1, 5 * kind, 5 * kind)
     shared = area_of(corners) * np.array(table) / divisor
-    found = M.reshape(kind, 5, kind, 5)
+    actual = M.reshape(kind, 5, kind, 5)
     for a, b in product(range(5), repeat=2):
         inertia = 0.0 if a != b else 0.2 if a < 3 else 0.2**3 / 12.0
-        np.testing.assert_allclose(found[:, a, :, b], inertia * shared, rtol=1e-12, atol=1e-18)
+        np.testing.assert_allclose(actual[:, a, :, b], inertia * shared, rtol=1e-12, atol=1e-18)
 
 
 def test_consistent_mass_of_restrained_unknowns_is_left_out() -> None:

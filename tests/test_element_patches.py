@@ -59,12 +59,12 @@ def with_pattern_in_the_middle(present: Bools) -> Mesh:
 def cubic_patterns(count: int) -> list[Bools]:
     """Some of the ways in which third points are absent, one of 10 to 12 staying."""
     rng = np.random.default_rng(12)
-    found: list[Bools] = []
-    while len(found) < count:
+    actual: list[Bools] = []
+    while len(actual) < count:
         present = np.concatenate([np.ones(4), rng.integers(0, 2, 8)]).astype(bool)
         if present[9:].any():
-            found.append(present)
-    return found
+            actual.append(present)
+    return actual
 
 
 TRANSITIONS = [

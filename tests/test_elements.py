@@ -298,7 +298,7 @@ def sorted_elements(*rows: list[int]) -> list[ElementBlock]:
 
 
 def test_elements_are_sorted_by_their_nodes_and_keep_their_rows() -> None:
-    found = sorted_elements(
+    actual = sorted_elements(
         [1, 2, 3],
         [1, 2, 3, 4],
         [4, 5, 6],
@@ -306,7 +306,7 @@ def test_elements_are_sorted_by_their_nodes_and_keep_their_rows() -> None:
         [1, 2, 3, 4, 0, 6],
         [1, 2, 3, 4, 0, 0, 0, 0, 0, 10],
     )
-    by_rows = {tuple(family.rows.tolist()): family for family in found}
+    by_rows = {tuple(family.rows.tolist()): family for family in actual}
     assert {rows: family.shape.name for rows, family in by_rows.items()} == {
         (0, 2): "triangle",
         (1,): "quadrilateral",
@@ -316,7 +316,7 @@ def test_elements_are_sorted_by_their_nodes_and_keep_their_rows() -> None:
     }
     assert by_rows[0, 2].nodes.tolist() == [[0, 1, 2], [3, 4, 5]]
     assert by_rows[5,].nodes.tolist() == [[0, 1, 2, 3, 9]]
-    for family in found:
+    for family in actual:
         assert len(family.present) == family.shape.nodes
         assert family.present.sum() == family.nodes.shape[1]
         assert family.take(np.array([0])).shape is family.shape
@@ -364,6 +364,6 @@ def test_jacobians_are_positive_where_their_determinants_are_also_at_straight_co
     determinants = interpolation.jacobian_determinants(family, nodal(2))
     assert np.abs(determinants[:, 2]).max() < 1e-6  # rounding decides there
     expected = (determinants > 0.0).all(axis=1)
-    found = interpolation.has_positive_jacobians(family, nodal(2))
-    assert found.tolist() == expected.tolist()
+    actual = interpolation.has_positive_jacobians(family, nodal(2))
+    assert actual.tolist() == expected.tolist()
     assert 0 < expected.sum() < 200

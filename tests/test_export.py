@@ -331,8 +331,8 @@ def test_exposures_of_a_run_that_ends_in_contact_are_noted_as_lower_bounds(file:
     failing = run(small(PROGRAM.replace("NEXT", "FAIL          1\nNEXT"), data=strengths))
     assert failing.still_in_contact
     failing.save(file, overwrite=True)
-    told = "fecm: note: the run ends in contact: exposures are lower bounds\n"
-    for dataset, note in (("exposures", told), ("failure/puck/exposure", told), ("tape3", "")):
+    text = "fecm: note: the run ends in contact: exposures are lower bounds\n"
+    for dataset, note in (("exposures", text), ("failure/puck/exposure", text), ("tape3", "")):
         done = call("export", file, "--to", "csv", "--dataset", dataset, "-o", "-")
         assert (done.exit_code, done.stderr) == (0, note)
 

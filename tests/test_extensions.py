@@ -137,8 +137,8 @@ def forces(deck: fecm.Deck, law: Any, *velocities: float) -> Floats:
 
 
 def test_a_sweep_gives_the_cases_of_a_users_law_as_runs_do(deck: fecm.Deck) -> None:
-    found = forces(deck, Dented(), 50.0, 115.0)
-    for velocity, force in zip([50.0, 115.0], found, strict=True):
+    actual = forces(deck, Dented(), 50.0, 115.0)
+    for velocity, force in zip([50.0, 115.0], actual, strict=True):
         alone = fecm.run_one(deck.with_(velocity=velocity), law=Dented()).force
         np.testing.assert_allclose(force, alone, rtol=1e-9, atol=1e-9)
 
@@ -170,8 +170,8 @@ class Counting(Dented):
 
 def test_a_sweep_asks_no_more_trials_of_a_case_than_its_own_run(deck: fecm.Deck) -> None:
     # The iterations of both cases take different numbers of passes.
-    found = forces(deck, Counting(), 115.0, 600.0)
-    np.testing.assert_allclose(found[0], fecm.run_one(deck, law=Counting()).force, rtol=1e-9)
+    actual = forces(deck, Counting(), 115.0, 600.0)
+    np.testing.assert_allclose(actual[0], fecm.run_one(deck, law=Counting()).force, rtol=1e-9)
 
 
 @pytest.mark.parametrize(

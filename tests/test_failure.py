@@ -177,5 +177,5 @@ def test_pucks_exposure_at_yt_is_1_whatever_its_slope(yt: float, s12: float, slo
 
 
 def test_interlaminar_exposure_is_a_quadratic_sum() -> None:
-    found = interlaminar(60.0, 40.0, np.array([36.0]), np.array([32.0]))
-    assert found[0] == pytest.approx(1.0)
+    actual = interlaminar(60.0, 40.0, np.array([36.0]), np.array([32.0]))
+    assert actual[0] == pytest.approx(1.0)

@@ -49,13 +49,13 @@ def plate(kind: int = 9, *, regular: bool = False) -> MeshArrays:
 def fields(mesh: MeshArrays, count: int, *, stretched: bool) -> Floats:
     """Displacements that rise, fall and change their sign; u and v are 0 where not `stretched`."""
     draw = np.random.default_rng(7)
-    found = draw.normal(size=(count, *mesh.equations.shape))
-    found *= 1e-3 * draw.choice([0.01, 0.3, 1.0, -1.0], size=(count, 1, 1))
+    actual = draw.normal(size=(count, *mesh.equations.shape))
+    actual *= 1e-3 * draw.choice([0.01, 0.3, 1.0, -1.0], size=(count, 1, 1))
     # Some multiples of fields before, of which no exposure rises.
-    found[2::3] = 0.7 * found[: len(found[2::3])]
+    actual[2::3] = 0.7 * actual[: len(actual[2::3])]
     if not stretched:
-        found[..., :2] = 0.0
-    return found
+        actual[..., :2] = 0.0
+    return actual
 
 
 def history(monitor: FailureMonitor, given: Floats) -> FailureEnvelope:
@@ -72,10 +72,10 @@ def times_of(given: Floats) -> list[float]:
 
 def assert_equal(one: FailureMonitor, other: FailureMonitor, given: Floats, rtol: float) -> None:
     """The same exposures, modes and times in both."""
-    found, wanted = history(one, given), history(other, given)
+    actual, wanted = history(one, given), history(other, given)
     pairs = (
-        (one.every_state(found), other.every_state(wanted)),
-        (found.interfaces, wanted.interfaces),
+        (one.every_state(actual), other.every_state(wanted)),
+        (actual.interfaces, wanted.interfaces),
     )
     for own, others in pairs:
         np.testing.assert_allclose(own.exposure, others.exposure, rtol=rtol, atol=0.0)
@@ -103,8 +103,8 @@ def test_strains_and_gradients_are_numpys_for_every_family(kind: int, regular: b
         envelope = history(CompiledMonitor(stresses, STRENGTHS), field[None])
         kept = envelope.kept
         assert isinstance(kept, compiled_failure._Kept)
-        found = kept.strain, kept.structure.held["gradient"]
-        for own, wanted in zip(found, stresses.strains(field), strict=True):
+        actual = kept.strain, kept.structure.held["gradient"]
+        for own, wanted in zip(actual, stresses.strains(field), strict=True):
             all_of_it = wanted if stretches else wanted[..., 3:]
             scale = np.abs(all_of_it).max(initial=0.0, where=~np.isnan(all_of_it))
             np.testing.assert_allclose(own, all_of_it, rtol=0.0, atol=1e-13 * scale)
@@ -278,9 +278,9 @@ def test_a_motion_that_is_no_longer_finite_leaves_what_numpy_leaves(value: float
 def with_counts(monitor: CompiledMonitor, share: float) -> CompiledMonitor:
     """The same criteria, of which about this share of the points count."""
     counts = np.random.default_rng(5).random(monitor.counts.shape) < share
-    made = copy(monitor)
-    made.counts, made.far = counts, np.asarray(counts.all(axis=1))
-    return made
+    built = copy(monitor)
+    built.counts, built.far = counts, np.asarray(counts.all(axis=1))
+    return built
 
 
 @pytest.mark.parametrize("share", [0.9, 0.0])
@@ -324,9 +324,9 @@ def test_interfaces_of_elements_without_nine_nodes_are_never_the_largest(
     mesh.elements[:incomplete, 8] = 0
     monitor = kind(PlyStresses(mesh, laminate(PLY, ANGLES, [0.125] * 8), gauss(3)), STRENGTHS)
     envelope, given = monitor.start(), fields(mesh, 2, stretched=True)
-    for found in (envelope.largest, monitor.update(envelope, given, times_of(given))):
-        state = np.atleast_2d(found.state)[-1, -1]
-        exposure = np.atleast_2d(found.exposure)[-1, -1]
+    for actual in (envelope.largest, monitor.update(envelope, given, times_of(given))):
+        state = np.atleast_2d(actual.state)[-1, -1]
+        exposure = np.atleast_2d(actual.exposure)[-1, -1]
         assert state == -1 if incomplete == 12 else state >= 3 * 7
         assert np.isnan(exposure) == (incomplete == 12)
 
@@ -339,17 +339,17 @@ def test_ply_and_place_are_those_of_the_largest_of_all_states(case: str, stretch
     elements, points, plies = monitor.stresses.shape
     x, y = np.random.default_rng(11).random((2, elements, points))
     envelope, given = monitor.start(), fields(plate(), 3, stretched=stretches)
-    found = monitor.located(monitor.update(envelope, given, times_of(given)), PlyPoints(x, y))
+    actual = monitor.located(monitor.update(envelope, given, times_of(given)), PlyPoints(x, y))
     exposure = monitor.every_state(envelope).exposure.reshape(-1, elements, points, plies, 2)
     away = np.where(monitor.counts[:, :, None, None], exposure, -1.0)
     count = len(CRITERIA)  # the column of the interfaces
     columns = [*range(count), *range(count + 1, 1 + len(exposure))]
     for column, values in zip(columns, away, strict=True):
         element, point, ply, _ = np.unravel_index(int(values.argmax()), values.shape)
-        assert found["exposure"][-1, column] == values.max()
-        assert found["ply"][-1, column] == ply + 1
-        assert found["x"][-1, column] == x[element, point]
-        assert found["y"][-1, column] == y[element, point]
+        assert actual["exposure"][-1, column] == values.max()
+        assert actual["ply"][-1, column] == ply + 1
+        assert actual["x"][-1, column] == x[element, point]
+        assert actual["y"][-1, column] == y[element, point]
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -396,13 +396,13 @@ def test_of_places_with_equal_exposures_that_with_the_lowest_number_is_told(
     each = history(monitor, field[None])
     exposure = each.plies.exposure.reshape(len(CRITERIA), 12, 9, -1)
     np.testing.assert_array_equal(exposure, np.broadcast_to(exposure[:, :1], exposure.shape))
-    found = places(field, 0.5 * field)
-    elements = found.state[0, :-1] // (9 * monitor.states)
-    points = found.state[0, :-1] // monitor.states % 9
+    actual = places(field, 0.5 * field)
+    elements = actual.state[0, :-1] // (9 * monitor.states)
+    points = actual.state[0, :-1] // monitor.states % 9
     np.testing.assert_array_equal(elements, np.where(points == 2, 5, 0))
-    assert found.state[0, -1] // 7 == 5  # of the interfaces
+    assert actual.state[0, -1] // 7 == 5  # of the interfaces
     later = places(alone, field)
-    np.testing.assert_array_equal(later.state[1], found.state[0])
+    np.testing.assert_array_equal(later.state[1], actual.state[0])
     assert (later.state[0, :-1] // (9 * monitor.states) == 11).all()
 
 

@@ -164,8 +164,8 @@ def test_blank_shear_strengths_and_constants_take_their_defaults() -> None:
 def test_fail_needs_strengths_and_report_mode() -> None:
     without = failing().replace(ALLO, "EXPE")
     assert "E203" in [f.code for f in load_deck(without).errors()]
-    found = load_deck(failing(), mode="listing").errors()
-    assert {f.code for f in found} >= {"E603"}
+    actual = load_deck(failing(), mode="listing").errors()
+    assert {f.code for f in actual} >= {"E603"}
 
 
 def test_a_single_ply_has_exposures_and_no_interface() -> None:

@@ -228,5 +228,5 @@ def test_the_probability_of_delamination_follows_from_the_law_of_the_toughness()
     laws = {"giic": f"lognormal:{median!r},{sigma}"}
     swept = fecm.sweep(deck, random=laws, samples=256, exceed="peak_force=threshold")
     assert swept.random is not None
-    (found,) = swept.random.exceedance.probability
-    assert found == pytest.approx(expected, abs=1.0 / 256)  # one draw in each of 256 strata
+    (actual,) = swept.random.exceedance.probability
+    assert actual == pytest.approx(expected, abs=1.0 / 256)  # one draw in each of 256 strata

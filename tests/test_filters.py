@@ -110,8 +110,8 @@ def test_a_class_is_the_recursion_of_the_standard_forward_and_backward() -> None
         return y
 
     expected = passed(passed(x.tolist())[::-1])[::-1]
-    found = filter_of("cfc:180")(dt * np.arange(1200.0), x)
-    np.testing.assert_allclose(found, np.array(expected), atol=1e-12)
+    actual = filter_of("cfc:180")(dt * np.arange(1200.0), x)
+    np.testing.assert_allclose(actual, np.array(expected), atol=1e-12)
 
 
 @pytest.mark.parametrize(("time", "told"), [

@@ -32,10 +32,10 @@ def test_the_peak_of_a_power_law_is_found_to_1e_6() -> None:
         rounds += 1
         return np.array([factors[n] * v**1.2 for n, v in pairs])
 
-    *found, low, high = lowest_velocities(
+    *actual, low, high = lowest_velocities(
         dict.fromkeys(range(4), 2.0), dict.fromkeys(range(4), 7.0), peaks
     ).values()
-    for n, velocity in enumerate(found):
+    for n, velocity in enumerate(actual):
         assert velocity == pytest.approx((7.0 / factors[n]) ** (1.0 / 1.2), rel=1e-6)
     assert low == "the peak force is above 7 from velocity 0.02 on"
     assert high == "the peak force is below 7 up to velocity 200"

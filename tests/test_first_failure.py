@@ -37,9 +37,9 @@ def failing(
 
 
 def run(text: str, **options: object) -> Result:
-    found = fecm.run(text, **options)  # type: ignore[arg-type]
-    assert isinstance(found, Result)
-    return found
+    actual = fecm.run(text, **options)  # type: ignore[arg-type]
+    assert isinstance(actual, Result)
+    return actual
 
 
 @pytest.fixture(scope="module")
@@ -47,14 +47,14 @@ def every_step() -> Result:
     return run(failing())
 
 
-def histories(found: Result) -> dict[str, np.ndarray]:
+def histories(result: Result) -> dict[str, np.ndarray]:
     """Largest exposure outside the load at every stored row, from the ply stresses."""
     (problem,) = load_deck(failing()).problems
     stresses = PlyStresses(problem.mesh, problem.laminate, problem.rules[2])
     ((card, *_),) = strengths_of_deck(problem.deck)
     assert card is not None
-    outside = found["failure/under_load"] == 0
-    rows = [stresses.evaluate(field) for field in found["tape3/displacement"]]
+    outside = result["failure/under_load"] == 0
+    rows = [stresses.evaluate(field) for field in result["tape3/displacement"]]
     return {
         name: np.array(
             [
@@ -136,11 +136,11 @@ def test_fail_that_is_never_evaluated_in_contact_is_told(tmp_path: Path, where: 
 
 
 def test_numpy_and_the_kernels_find_the_same_first_failures() -> None:
-    found, other = (run(failing(data=UNLIKE), solver=solver) for solver in ("auto", "numpy"))
+    actual, other = (run(failing(data=UNLIKE), solver=solver) for solver in ("auto", "numpy"))
     assert [one.criterion for one in other.first_failures] == [
-        one.criterion for one in found.first_failures
+        one.criterion for one in actual.first_failures
     ]
-    for one, same in zip(found.first_failures, other.first_failures, strict=True):
+    for one, same in zip(actual.first_failures, other.first_failures, strict=True):
         assert (one.mode, one.ply, one.x, one.y) == (same.mode, same.ply, same.x, same.y)
         assert one.time == pytest.approx(same.time, rel=1e-9)
 
@@ -201,13 +201,13 @@ def test_points_under_the_load_do_not_count_and_keep_their_exposures() -> None:
         envelope.find_largest(counts, np.asarray(counts.all(axis=1)))
         return envelope.largest
 
-    found = largest(~near)
+    actual = largest(~near)
     np.testing.assert_array_equal(states.exposure, before)
     for number in range(len(CRITERIA)):
         outside = np.where(near[:, :, None, None], 0.0, each[number])
-        assert found.exposure[number] == outside.max() < 1.0
-        assert found.state[number] == outside.argmax()
+        assert actual.exposure[number] == outside.max() < 1.0
+        assert actual.state[number] == outside.argmax()
     # Elements 2 and 3 have a point under the load.
-    assert (found.exposure[-1], found.state[-1]) == (3.0, 0)
+    assert (actual.exposure[-1], actual.state[-1]) == (3.0, 0)
     nothing = largest(np.zeros_like(near))
     assert np.isnan(nothing.exposure).all()

@@ -222,7 +222,7 @@ def test_no_contact_is_estimated_on_a_fabric() -> None:
 def test_the_mesh_of_a_window_is_obeyed_whatever_the_radius_of_the_patch() -> None:
     window = ("--fixture", "D7136", *PLATE[:4], "--material", "IM7/8552", *QUICK)
     wide, narrow = (new(*window, "--patch", f"disc:{c}") for c in (20, 2))
-    (wide_mesh, narrow_mesh) = (fecm.read_one(made.stdout).control for made in (wide, narrow))
+    (wide_mesh, narrow_mesh) = (fecm.read_one(built.stdout).control for built in (wide, narrow))
     assert narrow_mesh.numel == wide_mesh.numel
     assert "is larger than the radius of the patch, 2" in narrow.stderr
 

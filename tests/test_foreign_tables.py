@@ -235,13 +235,13 @@ def test_a_calibration_converts_the_transducer_to_the_unit_of_the_accelerometer(
         assert done.exit_code == 0, done.stderr
         return float(done.stdout.split("slope V_F/V_a")[1].split()[0]), done.stderr
 
-    plain, told = slope("time,V_F,V_a")
-    assert told == ""
+    plain, text = slope("time,V_F,V_a")
+    assert text == ""
     assert slope("time,V_F (mV),V_a (mV)")[0] == plain
     assert slope("time,V_F (mV),V_a (V)")[0] == pytest.approx(1e-3 * plain, rel=1e-5)
-    turned, told = slope("time,V_F,V_a", "--columns", "time,V_F,-V_a")
+    turned, text = slope("time,V_F,V_a", "--columns", "time,V_F,-V_a")
     assert turned == -plain
-    assert "--columns time,V_F,-V_a" in told
+    assert "--columns time,V_F,-V_a" in text
     path.write_text("time,V_F (mV),V_a\n0,0,0\n1,2,4.1\n2,4,7.9\n3,1,2\n")
     done = call("rod", "calibrate", path, "--mass", 1, "--c-a", 1)
     assert_unusable(done)
@@ -350,11 +350,11 @@ def test_records_of_oscilloscopes_keep_every_sample(
 ) -> None:
     file = tmp_path / "scope.csv"
     file.write_text(text)
-    found = measurement_of(file, DECK, columns)
-    samples = np.arange(len(found.time))
+    actual = measurement_of(file, DECK, columns)
+    samples = np.arange(len(actual.time))
     assert len(samples) >= 5
-    np.testing.assert_allclose(found.time, size * 1e-4 * (samples - 2), atol=1e-15)
-    np.testing.assert_allclose(found.force, 10.0 * (samples + 1))
+    np.testing.assert_allclose(actual.time, size * 1e-4 * (samples - 2), atol=1e-15)
+    np.testing.assert_allclose(actual.force, 10.0 * (samples + 1))
 
 
 @pytest.mark.parametrize(
@@ -397,8 +397,8 @@ def test_a_comma_that_may_separate_thousands_is_noted_once_nothing_tells(tmp_pat
     file = tmp_path / "force.csv"
     file.write_text("time (us)\tforce (N)\n0\t1,060\n1\t1,250\n2\t1,125\n")
     with pytest.warns(FecmWarning, match=":2: force, '1,060', is taken as 1.060; if its comma"):
-        found = measurement_of(file, DECK)
-    assert found.force.tolist() == [1.06, 1.25, 1.125]
+        actual = measurement_of(file, DECK)
+    assert actual.force.tolist() == [1.06, 1.25, 1.125]
     file.write_text("time (us)\tforce (N)\n0,5\t1,060\n1,5\t1,250\n2,5\t1,125\n")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -512,9 +512,9 @@ def test_a_rise_time_has_a_unit_and_one_below_the_step_is_doubted(tmp_path: Path
 
     assert filtered("first-order:2")[0] == filtered("first-order:2us")[0]
     assert filtered("first-order:2us") == filtered("first-order:0.002ms")
-    told = "the rise time 2e-06 us of the filter is below the time step 0.2 us"
-    assert told in filtered("first-order:2e-6")[1]
-    assert told not in filtered("first-order:2us")[1]
+    message = "the rise time 2e-06 us of the filter is below the time step 0.2 us"
+    assert message in filtered("first-order:2e-6")[1]
+    assert message not in filtered("first-order:2us")[1]
     path.write_text(f"Time,Incident_strain\n{rows}")
     done = call("rod", "filter", path, "--filter", "first-order:2us", "-o", "-")
     assert_unusable(done)

@@ -252,12 +252,12 @@ def test_what_is_wrong_with_a_table_is_said_with_its_likely_cause(folder: Path) 
         "no numbers": ((time, np.where(force > 1, np.nan, force)), "time,force", "not a finite"),
         "transducer": ((time, force), "time,transducer", "column transducer and no force"),
     }
-    for columns, head, told in wrong.values():
+    for columns, head, text in wrong.values():
         write(folder / "wrong.csv", *columns, head=head)
         done = identify(folder, table="wrong.csv")
         assert (done.exit_code, done.stdout) == (2, "")
         assert done.stderr.splitlines()[-1].startswith("fecm: error: ")
-        assert told in done.stderr.splitlines()[-1], done.stderr
+        assert text in done.stderr.splitlines()[-1], done.stderr
 
 
 def test_files_of_the_command_are_never_replaced(folder: Path) -> None:

@@ -25,19 +25,19 @@ from tests.indentation_tests import (
 ALPHA_CR = 3.16e-3
 
 
-def constants(found: ContactLawFit) -> dict[str, tuple[FittedValue, float]]:
+def constants(actual: ContactLawFit) -> dict[str, tuple[FittedValue, float]]:
     """Every estimate of a fit of `make_test()`, and the truth."""
-    assert found.q is not None
-    assert found.line is not None
+    assert actual.q is not None
+    assert actual.line is not None
     pairs = {
-        "k": (found.k, K),
-        "n": (found.free.n, 1.5),
-        "k with n": (found.free.k, K),
-        "q": (found.q, Q),
-        "s_p": (found.line.s_p, S_P),
-        "alpha_p": (found.line.alpha_p, ALPHA_P),
+        "k": (actual.k, K),
+        "n": (actual.free.n, 1.5),
+        "k with n": (actual.free.k, K),
+        "q": (actual.q, Q),
+        "s_p": (actual.line.s_p, S_P),
+        "alpha_p": (actual.line.alpha_p, ALPHA_P),
     }
-    for n, (cycle, peak) in enumerate(zip(found.cycles, PEAKS, strict=True)):
+    for n, (cycle, peak) in enumerate(zip(actual.cycles, PEAKS, strict=True)):
         left = S_P * (peak - ALPHA_P)
         pairs[f"alpha_m {n}"] = (cycle.alpha_m, peak)
         pairs[f"alpha_0 {n}"] = (cycle.alpha_0, left)
@@ -48,7 +48,7 @@ def constants(found: ContactLawFit) -> dict[str, tuple[FittedValue, float]]:
 def deviations(*, indentation: float, proportional: bool = False) -> dict[str, Floats]:
     """Deviations from the truth in standard errors, of 50 seeds."""
     a, f = make_test()
-    found: dict[str, list[float]] = {}
+    actual: dict[str, list[float]] = {}
     for seed in range(50):
         random = np.random.default_rng(seed).standard_normal(len(f))
         force = f * (1.0 + 0.01 * random) if proportional else noisy(f, seed)
@@ -56,14 +56,14 @@ def deviations(*, indentation: float, proportional: bool = False) -> dict[str, F
         for name, (estimate, truth) in constants(fit_contact_law(path, force)).items():
             if estimate.error:  # a peak that was held has none
                 deviation = (estimate.value - truth) / estimate.error
-                found.setdefault(name, []).append(abs(deviation))
-    return {name: np.array(values) for name, values in found.items()}
+                actual.setdefault(name, []).append(abs(deviation))
+    return {name: np.array(values) for name, values in actual.items()}
 
 
 # Of 50 fair draws fewer than 23 or more than 44 within one error, or fewer than 43 within two, come
 # about less than once in a thousand times.
-def assert_fair(found: dict[str, Floats]) -> None:
-    for name, values in found.items():
+def assert_fair(actual: dict[str, Floats]) -> None:
+    for name, values in actual.items():
         assert len(values) >= 45
         assert 23 <= np.count_nonzero(values < 1.0) <= 44, name
         assert np.count_nonzero(values < 2.0) >= 43, name
@@ -74,9 +74,9 @@ def assert_fair(found: dict[str, Floats]) -> None:
 
 @pytest.mark.long
 def test_constants_lie_inside_their_errors_as_often_as_they_should() -> None:
-    found = deviations(indentation=0.0)
-    assert_fair(found)
-    everything = np.concatenate(list(found.values()))
+    actual = deviations(indentation=0.0)
+    assert_fair(actual)
+    everything = np.concatenate(list(actual.values()))
     assert np.mean(everything < 1.0) == pytest.approx(0.683, abs=0.06)
     assert np.mean(everything < 2.0) == pytest.approx(0.954, abs=0.03)
 
@@ -88,8 +88,8 @@ def test_errors_hold_for_a_scatter_that_grows_with_the_force() -> None:
 
 @pytest.mark.long
 def test_errors_hold_where_the_indentation_is_noisy_too() -> None:
-    found = deviations(indentation=0.005)
-    assert_fair(found)
+    actual = deviations(indentation=0.005)
+    assert_fair(actual)
 
 
 def test_a_test_without_noise_gives_the_constants_themselves() -> None:
@@ -195,8 +195,8 @@ def test_a_line_on_one_side_of_all_its_points_is_noted(share: float, side: str) 
     fit = fit_contact_law(a, noisy(f, 0))
     assert fit.line is not None
     start = replace(fit.line.alpha_p, value=share * fit.line.alpha_p.value)
-    told = "; ".join(fit_notes(replace(fit, line=replace(fit.line, alpha_p=start))))
-    assert (f"is {side} all of its points" in told) is bool(side)
+    text = "; ".join(fit_notes(replace(fit, line=replace(fit.line, alpha_p=start))))
+    assert (f"is {side} all of its points" in text) is bool(side)
 
 
 def test_one_unloading_tells_alpha_cr() -> None:

@@ -121,21 +121,21 @@ def test_a_group_of_corners_of_second_order_sides_has_their_middles_too() -> Non
     low = [row for row, (x, y) in enumerate(points) if y == 0.0]
     corners = sorted(set(low) & set((nodes[:, :4] - 1).ravel().tolist()))
     assert len(corners) == 3
-    made = imported(points, nodes - 1, groups={"low": corners}).imported
-    assert made is not None
-    on = made.points[made.groups["low"]]
+    built = imported(points, nodes - 1, groups={"low": corners}).imported
+    assert built is not None
+    on = built.points[built.groups["low"]]
     assert len(on) == 5
     assert (on[:, 1] == 0.0).all()
 
 
 def test_a_line_in_two_physical_groups_of_gmsh_counts_for_both() -> None:
     pytest.importorskip("meshio", reason="meshes are read by meshio")
-    made = fecm.Plate.from_mesh(DATA / "two-groups-gmsh41.msh").imported
-    assert made is not None
-    left, rim = (made.points[made.groups[name]] for name in ("left", "rim"))
-    assert (left[:, 0] == made.extent[0][0]).all()
+    built = fecm.Plate.from_mesh(DATA / "two-groups-gmsh41.msh").imported
+    assert built is not None
+    left, rim = (built.points[built.groups[name]] for name in ("left", "rim"))
+    assert (left[:, 0] == built.extent[0][0]).all()
     assert (left.shape[0], rim.shape[0]) == (9, 32)  # 8 x 8 elements
-    assert made.surfaces["plate"].tolist() == list(range(64))
+    assert built.surfaces["plate"].tolist() == list(range(64))
 
 
 def test_cells_whose_nodes_are_in_another_order_are_named_as_such() -> None:

@@ -198,10 +198,10 @@ def test_a_peak_that_is_known_at_some_end_is_that_of_the_whole_run(mass: float) 
             (run["energy/plate_kinetic"] + run["energy/plate_strain"])[:steps, None],
             0.5 * mass * 2330.0**2,
         )
-        found = impact_metrics(
+        actual = impact_metrics(
             force, run.time[:steps], IndentationMetrics(none, none, none, none), hit, motion
         )
-        peak = found.columns["peak_force"][0]
+        peak = actual.columns["peak_force"][0]
         if not math.isnan(peak):
             known += 1
             assert peak == run.force.max()
@@ -320,27 +320,27 @@ def test_the_error_that_is_told_is_that_of_nonlinear_impacts(row: dict[str, str]
     if ratio > 5.0:
         assert "at least" in softness(ratio, in_plane)
         return
-    for told in (softness(ratio, in_plane), softness(ratio, InPlane.UNKNOWN)):
-        low, high = (int(word) for word in told.split() if word.isdigit())
+    for text in (softness(ratio, in_plane), softness(ratio, InPlane.UNKNOWN)):
+        low, high = (int(word) for word in text.split() if word.isdigit())
         assert low - 1.5 <= error <= high + 1.5
 
 
 def test_a_run_says_what_is_open_and_what_is_elastic_only() -> None:
     cut, whole = fecm.run_one(soft(3e-4)), fecm.run_one(soft().with_(velocity=2500))
     assert (cut.end, whole.end) == (End.RISING, End.OVER)
-    told = "\n".join(run_summary(cut))
-    assert "not reached by the end of the run, which is in contact: open" in told
-    assert "peak force        at least" in told
+    text = "\n".join(run_summary(cut))
+    assert "not reached by the end of the run, which is in contact: open" in text
+    assert "peak force        at least" in text
     assert math.isnan(cut.metrics["peak_force"])
     assert math.isnan(float(cut.threshold["margin"]))
     assert "peak not reached" in cut.validity
     threshold = float(whole.threshold["force"])
-    told = "\n".join(run_summary(whole))
+    text = "\n".join(run_summary(whole))
     assert (
         f"(elastic prediction; delamination is expected at the latest from {threshold:.4g} N"
-        in told
+        in text
     )
-    assert " absorbed (left in plate, indentation and projectile)" in told
+    assert " absorbed (left in plate, indentation and projectile)" in text
     assert {"w > 0.3 h", "peak force > threshold"} <= set(whole.validity.split("; "))
 
 
@@ -462,8 +462,8 @@ def test_an_estimate_tells_the_deflection_at_the_threshold(tmp_path: Path) -> No
     (tmp_path / "d.inp").write_text(soft(3e-3).with_(velocity=200).to_text())
     done = call("estimate", "d.inp", cwd=tmp_path)
     assert done.exit_code == 0
-    told = re.findall(r"the (.*) at the threshold deflects by (\S+) h", done.stderr)
-    deflections = {model: float(ratio) for model, ratio in told}
+    text = re.findall(r"the (.*) at the threshold deflects by (\S+) h", done.stderr)
+    deflections = {model: float(ratio) for model, ratio in text}
     assert list(deflections) == ["static plate", "run"]
     # The run at the threshold goes on until its contact is over.
     longer = fecm.run_one(soft(12e-3).with_(velocity=2222))

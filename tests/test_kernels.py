@@ -62,8 +62,8 @@ WARNINGS = ("-std=gnu11", "-Wall", "-Wextra", "-Werror", "-Wno-psabi")
 @lru_cache(maxsize=2)
 def problem(text: str) -> Problem:
     """The checked problem of a deck."""
-    (found,) = load_deck(text).problems
-    return found
+    (actual,) = load_deck(text).problems
+    return actual
 
 
 def assert_same_product(text: str, dofs: int, slips: frozenset[str]) -> None:
@@ -79,8 +79,8 @@ def assert_same_product(text: str, dofs: int, slips: frozenset[str]) -> None:
         replace(family, coordinates=family.coordinates - family.coordinates[:, :1])
         for family in plate.families
     ]
-    wanted, found = stiffness_operator(plate, "numpy", kept)(u), product(u)
-    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=5e-15 * np.abs(wanted).max())
+    wanted, actual = stiffness_operator(plate, "numpy", kept)(u), product(u)
+    np.testing.assert_allclose(actual, wanted, rtol=0.0, atol=5e-15 * np.abs(wanted).max())
     assert len(product.plate.columns) == dofs
 
 
@@ -140,11 +140,11 @@ def test_assumed_shear_strains_of_fields_are_numpys(
     known = StrainField(elements, coordinates, rule, transposed_jacobian=slip, assumes_shear=True)
     wanted = known.evaluate(fields)
     monkeypatch.delattr(StrainField, "evaluate")
-    found = CompiledStrains(
+    actual = CompiledStrains(
         elements, coordinates, rule, transposed_jacobian=slip, assumes_shear=True
     )
     atol = 1e-14 * np.abs(wanted).max()
-    np.testing.assert_allclose(found.evaluate(fields), wanted, rtol=0.0, atol=atol)
+    np.testing.assert_allclose(actual.evaluate(fields), wanted, rtol=0.0, atol=atol)
 
 
 @compiled
@@ -190,9 +190,9 @@ DECKS = {
 PLACES = {f"exposures/{name}" for name in ("mode", "ply", "x", "y")}
 
 
-def assert_close(found: Result, wanted: Result) -> None:
+def assert_close(result: Result, wanted: Result) -> None:
     """Every dataset agrees to 1e-10 of its maximum, but for the places of largest exposures."""
-    assert list(found) == list(wanted)
+    assert list(result) == list(wanted)
     for name in wanted:
         if name in PLACES:
             continue
@@ -203,15 +203,15 @@ def assert_close(found: Result, wanted: Result) -> None:
         # NumPy's step of the rod carries the rounding of its rigid velocity, 1e-11 of a step's
         # acceleration, where the modes of the kernels are exact to 2e-15.
         atol = (1e-9 if name.endswith("acceleration") else 1e-10) * scale
-        np.testing.assert_allclose(found[name], values, rtol=0.0, atol=atol, err_msg=name)
+        np.testing.assert_allclose(result[name], values, rtol=0.0, atol=atol, err_msg=name)
 
 
 @compiled
 @pytest.mark.parametrize("name", DECKS)
 @pytest.mark.few(3)  # of 10, 0.2 s each
 def test_a_run_is_that_of_numpy(name: str) -> None:
-    found, wanted = (fecm.run_one(DECKS[name], solver=s) for s in ("kernels", "numpy"))
-    assert_close(found, wanted)
+    actual, wanted = (fecm.run_one(DECKS[name], solver=s) for s in ("kernels", "numpy"))
+    assert_close(actual, wanted)
 
 
 @compiled
@@ -257,8 +257,8 @@ def test_the_modes_of_a_rod_take_the_step_of_its_matrices(elements: int, tapered
     T, h = modes.step(integrator)
     moved = np.einsum("abm,bm->am", T.reshape(3, 3, -1), modes.motion(state)) + 5e3 * h
     after = integrator.advance(state, 5e3)
-    for found, wanted in zip(moved[1:] @ modes.shapes.T, after.motion[1:], strict=True):
-        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-9 * np.abs(wanted).max())
+    for actual, wanted in zip(moved[1:] @ modes.shapes.T, after.motion[1:], strict=True):
+        np.testing.assert_allclose(actual, wanted, rtol=0.0, atol=1e-9 * np.abs(wanted).max())
 
 
 HEADER = Path(kernels.__file__).with_name("structures.h")

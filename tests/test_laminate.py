@@ -41,7 +41,7 @@ def reference_matrix(name: str, suffix: str = "") -> Floats:
     return np.array([[entries["".join(sorted(a + b))] for b in "126"] for a in "126"])
 
 
-def assert_same(found: Floats, expected: Floats, scale: float | None = None) -> None:
+def assert_same(actual: Floats, expected: Floats, scale: float | None = None) -> None:
     """Compare to 1e-10: entry by entry, but with the scale where zero is meant.
 
     The scale is the matrix' largest entry, unless all of it is meant to be zero.
@@ -49,7 +49,7 @@ def assert_same(found: Floats, expected: Floats, scale: float | None = None) -> 
     size = float(np.abs(expected).max()) if scale is None else scale
     meant_zero = np.abs(expected) < 1e-12 * size
     allowed = 1e-10 * np.where(meant_zero, size, np.abs(expected))
-    np.testing.assert_array_less(np.abs(found - expected), allowed + 1e-300)
+    np.testing.assert_array_less(np.abs(actual - expected), allowed + 1e-300)
 
 
 # Plies -------------------------------------------------------------------------------------------
@@ -65,14 +65,14 @@ def test_a_ply_has_the_reference_files_plane_stress_stiffness() -> None:
 
 @pytest.mark.parametrize("angle", [0, 45, -45])
 def test_a_turned_ply_has_the_reference_files_stiffness(angle: int) -> None:
-    found = transformed_stiffness(reduced_stiffness(REPORT_PLY), angle)
-    assert_same(found, reference_matrix("Qbar", f"({angle})"))
+    actual = transformed_stiffness(reduced_stiffness(REPORT_PLY), angle)
+    assert_same(actual, reference_matrix("Qbar", f"({angle})"))
 
 
 @pytest.mark.parametrize("angle", [0.0, 20.0, 45.0, -45.0, 70.0, 90.0, 115.0, -160.0])
 def test_stiffness_turns_as_a_tensor_of_fourth_order(angle: float) -> None:
-    found = transformed_stiffness(reduced_stiffness(GENERAL_PLY), angle)
-    assert_same(found, turned_stiffness(GENERAL_PLY, angle))
+    actual = transformed_stiffness(reduced_stiffness(GENERAL_PLY), angle)
+    assert_same(actual, turned_stiffness(GENERAL_PLY, angle))
 
 
 @pytest.mark.parametrize("angle", [0.0, 20.0, 45.0, -45.0, 70.0, 90.0, 115.0, -160.0])
@@ -183,11 +183,11 @@ def laminate_of(material: Material, *, isotropic_g12: bool = False) -> LaminateS
 
 
 def test_a_decks_stiffness_is_the_layers_and_its_inertia_the_cards() -> None:
-    found = laminate_of(material(REPORT_PLY, 0.2))
-    assert_same(found.A, reference_matrix("A"))
-    assert_same(found.D, reference_matrix("D"))
-    assert found.mass == pytest.approx(0.000148 * 0.2, rel=1e-12)
-    assert found.rotary_inertia == pytest.approx(0.000148 * 0.2**3 / 12.0, rel=1e-12)
+    actual = laminate_of(material(REPORT_PLY, 0.2))
+    assert_same(actual.A, reference_matrix("A"))
+    assert_same(actual.D, reference_matrix("D"))
+    assert actual.mass == pytest.approx(0.000148 * 0.2, rel=1e-12)
+    assert actual.rotary_inertia == pytest.approx(0.000148 * 0.2**3 / 12.0, rel=1e-12)
 
 
 def test_a_woven_ply_keeps_its_shear_modulus_unless_it_is_asked_to_be_isotropic() -> None:

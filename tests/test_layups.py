@@ -74,10 +74,10 @@ def layups(draw: st.DrawFn) -> Item:
 @settings(max_examples=40)
 @given(layups(), st.sampled_from(SEPARATORS))
 def test_plies_written_in_one_notation_are_read_as_these_plies(layup: Item, mark: str) -> None:
-    text, found = layup
+    text, actual = layup
     written = text.replace("|", mark)
     assume(not re.search(r"\s[2-9](?![0-9.e_])", written))  # may be a lost subscript
-    assert parse_layup(written) == found
+    assert parse_layup(written) == actual
 
 
 @settings(max_examples=40)
@@ -85,11 +85,11 @@ def test_plies_written_in_one_notation_are_read_as_these_plies(layup: Item, mark
 def test_plies_written_in_several_notations_are_read_as_these_plies_or_refused(
     layup: Item, data: st.DataObject
 ) -> None:
-    text, found = layup
+    text, actual = layup
     first, *parts = text.split("|")
     mixed = first + "".join(data.draw(st.sampled_from(SEPARATORS)) + part for part in parts)
     with contextlib.suppress(LayupError):
-        assert parse_layup(mixed) == found
+        assert parse_layup(mixed) == actual
 
 
 @given(st.lists(angles, min_size=2, max_size=6))

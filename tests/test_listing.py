@@ -133,9 +133,9 @@ def test_prop_between_two_loops_replaces_the_contact_force_of_one_step() -> None
     )
     plain = run(small(program.replace("PROP\n", "")))
     zero = "    1    1\nSTOP\n"  # a table of nothing
-    found = run(small(program.replace("PROP", "PROP          1"), stop=False) + zero)
+    actual = run(small(program.replace("PROP", "PROP          1"), stop=False) + zero)
     plate = ready(small()).plate
-    rows = [r.tape3.displacement[-1][plate.mesh.equations > 0] for r in (plain, found)]
+    rows = [r.tape3.displacement[-1][plate.mesh.equations > 0] for r in (plain, actual)]
     # The force that is missing in the first of the last ten steps moves the plate for all of them.
     missing = plate.mass @ (rows[0] - rows[1])
     assert missing == pytest.approx(plain.force[9] * (5e-7) ** 2 * 10, rel=1e-9)
@@ -165,10 +165,10 @@ def test_more_layers_than_the_arrays_hold_are_refused_with_the_reason() -> None:
 
     assert load_deck(layered(25), "listing").errors() == []
     assert load_deck(layered(26)).errors() == []
-    (found,) = load_deck(layered(26), "listing").errors()
-    assert (found.code, "26 layers are more than the 25" in found.message) == ("E602", True)
-    assert found.place is not None
-    assert found.place.text.startswith("   26")
+    (actual,) = load_deck(layered(26), "listing").errors()
+    assert (actual.code, "26 layers are more than the 25" in actual.message) == ("E602", True)
+    assert actual.place is not None
+    assert actual.place.text.startswith("   26")
 
 
 def test_a_deck_that_listing_mode_refuses_is_unusable_input(tmp_path: Path) -> None:

@@ -62,15 +62,15 @@ def noisy() -> fecm.Location:
     return located(strains, noise=noise)
 
 
-def distance(found: fecm.Location, place: tuple[float, float]) -> float:
+def distance(location: fecm.Location, place: tuple[float, float]) -> float:
     """Distance of the place found from another."""
-    return float(np.hypot(found.x - place[0], found.y - place[1]))
+    return float(np.hypot(location.x - place[0], location.y - place[1]))
 
 
-def deviations(found: fecm.Location, place: tuple[float, float]) -> float:
+def deviations(location: fecm.Location, place: tuple[float, float]) -> float:
     """The same in standard deviations, by the covariance."""
-    off = np.array([found.x, found.y]) - place
-    return float(np.sqrt(off @ np.linalg.solve(found.covariance, off)))
+    off = np.array([location.x, location.y]) - place
+    return float(np.sqrt(off @ np.linalg.solve(location.covariance, off)))
 
 
 # The responses ------------------------------------------------------------------------------------
@@ -103,13 +103,13 @@ def test_the_run_of_a_gage_gives_the_strains_of_an_impulse(
     nodes = np.arange(len(problem.mesh.coordinates))
     # A hat of one step is an impulse in the second step.
     impulse = Sampling(dt=2e-7, every=1, count=300, width=1)
-    found = responses(motion, rows_of(read, len(nodes)), nodes, impulse, float)
+    actual = responses(motion, rows_of(read, len(nodes)), nodes, impulse, float)
     weights = patch_weights(problem.mesh, "DISC", 5.0, *STRUCK)
     load = np.zeros((len(nodes), 5))
     load[:, 2] = weights
     sums = motion.dof_sums(read.dof_indices, read.weights)
     _, direct = plate_response(motion, motion.load(load), impulse.dt, 298, sums)
-    by_gages = np.einsum("n,gns->gs", weights, found)[:, 2:]
+    by_gages = np.einsum("n,gns->gs", weights, actual)[:, 2:]
     assert np.abs(by_gages - direct).max() < 1e-10 * np.abs(direct).max()
 
 
@@ -254,7 +254,7 @@ def test_the_errors_of_several_seeds_are_those_of_the_covariance() -> None:
     assert 8.3 < squares < 37.6
 
 
-def strains_per_place_and_force(deck: fecm.Deck, found: fecm.Location) -> Floats:
+def strains_per_place_and_force(deck: fecm.Deck, location: fecm.Location) -> Floats:
     """Change of the fitted strains with x, y and the forces that are not held at 0, by runs."""
     problem, step, dt = sole_problem(deck), 0.3, 2e-7
     mesh, motion = problem.mesh, PlateMotion(moving_plate(problem.plate))
@@ -268,15 +268,15 @@ def strains_per_place_and_force(deck: fecm.Deck, found: fecm.Location) -> Floats
         _, impulse = plate_response(motion, motion.load(load), dt, len(time), sums)
         moved = []
         for force in forces:
-            acting = np.interp(time - dt, np.append(0.0, found.time), np.append(0.0, force))
+            acting = np.interp(time - dt, np.append(0.0, location.time), np.append(0.0, force))
             each = [np.interp(TIME, time, np.convolve(one, acting)[: len(time)]) for one in impulse]
             moved.append(np.concatenate(each))
         return moved
 
-    x, y, force = found.x, found.y, found.force
+    x, y, force = location.x, location.y, location.force
     (right,), (left,) = strains(x + step, y, force), strains(x - step, y, force)
     (above,), (below,) = strains(x, y + step, force), strains(x, y - step, force)
-    hats = np.eye(len(force))[(force > 0.0) | ~found.determined]
+    hats = np.eye(len(force))[(force > 0.0) | ~location.determined]
     slopes = [(right - left) / (2.0 * step), (above - below) / (2.0 * step)]
     return np.stack([*slopes, *strains(x, y, *hats)], axis=1)
 
@@ -321,13 +321,13 @@ def test_the_95_percent_ellipse_covers_the_place_in_95_of_100(
 
 
 def test_the_ellipse_encloses_its_share_of_a_normal_distribution() -> None:
-    found = noisy()
-    edge = found.ellipse(0.5) - [found.x, found.y]
-    squares = np.einsum("ni,ij,nj->n", edge, np.linalg.inv(found.covariance), edge)
+    actual = noisy()
+    edge = actual.ellipse(0.5) - [actual.x, actual.y]
+    squares = np.einsum("ni,ij,nj->n", edge, np.linalg.inv(actual.covariance), edge)
     assert squares == pytest.approx(2.0 * np.log(2.0))
     assert np.array_equal(edge[0], edge[-1]) or np.abs(edge[0] - edge[-1]).max() < 1e-12
     with pytest.raises(ValueError, match="between 0 and 1"):
-        found.ellipse(1.0)
+        actual.ellipse(1.0)
 
 
 def test_the_noise_is_that_of_the_residual_unless_it_is_given() -> None:
@@ -344,18 +344,18 @@ def test_the_noise_is_that_of_the_residual_unless_it_is_given() -> None:
 
 
 def test_the_impulse_ends_with_the_contact() -> None:
-    found = noisy()
+    actual = noisy()
     run = run_of(radius=SMALL)
-    assert found.contact_end is not None
-    before = run.time <= found.contact_end  # the projectile touches the panel once more
+    assert actual.contact_end is not None
+    before = run.time <= actual.contact_end  # the projectile touches the panel once more
     assert run.force[before][-1] < 0.1 * run.force.max()  # hats are coarse beside it
     contact = float(np.trapezoid(run.force[before], run.time[before]))
-    assert found.impulse == pytest.approx(contact, rel=0.03)
+    assert actual.impulse == pytest.approx(contact, rel=0.03)
 
 
 def test_the_energy_bound_follows_from_impulse_and_mass() -> None:
-    found = dataclasses.replace(noisy(), mass=2e-6)
-    assert found.energy_bound == pytest.approx(found.impulse**2 / 4e-6)
+    actual = dataclasses.replace(noisy(), mass=2e-6)
+    assert actual.energy_bound == pytest.approx(actual.impulse**2 / 4e-6)
     assert noisy().energy_bound is None
 
 
@@ -626,7 +626,7 @@ def test_gages_that_tell_the_sides_apart_are_accepted(
 def test_a_twisted_panel_or_a_shear_preload_tells_the_sides_apart() -> None:
     plain = with_gages(panel("[0/90]2s"), *[(x, 40.0, 0.72, 0.0) for x in (20.0, 45.0, 75.0)])
     twist = model.Curvature(radius_xy=2000.0)
-    for extra, found in (
+    for extra, actual in (
         (model.Curvature(radius_x=600.0), True),
         (twist, False),
         (model.Preload(1.0, 1.0, 0.0), True),
@@ -636,7 +636,7 @@ def test_a_twisted_panel_or_a_shear_preload_tells_the_sides_apart() -> None:
         plate = build_plate(deck, generate(deck))
         read = gages(plate.mesh, deck.require(model.Gages).records, curvature=plate.curvature)
         rows = rows_of(read, len(plate.mesh.coordinates))
-        assert (shared_symmetry(plate, rows) is not None) == found
+        assert (shared_symmetry(plate, rows) is not None) == actual
 
 
 def test_gages_at_the_centre_cant_tell_a_half_turn() -> None:

@@ -303,10 +303,10 @@ def test_two_locations_are_compared_and_one_with_a_run_is_not(tmp_path: Path) ->
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("locate")
-    (made / "panel.inp").write_text(deck().to_text(), encoding="utf-8")
-    written(made, "time,gage 1,gage 2,gage 3", strains())
-    return made
+    built = tmp_path_factory.mktemp("locate")
+    (built / "panel.inp").write_text(deck().to_text(), encoding="utf-8")
+    written(built, "time,gage 1,gage 2,gage 3", strains())
+    return built
 
 
 def locate(folder: Path, *options: object, table: str = "strains.csv") -> Done:

@@ -122,8 +122,8 @@ def test_what_no_macro_uses_is_an_error_at_its_place(
 def test_every_word_refuses_a_second_word_and_a_second_number(word: str) -> None:
     second = () if WORDS[word].second else (f"{word:14}0    9", f"{word},,0,9")
     for card in (f"{word:4} AB", *second):
-        found = load_deck(small(PROGRAM + card + "\n")).errors()
-        assert "E514" in [finding.code for finding in found], card
+        actual = load_deck(small(PROGRAM + card + "\n")).errors()
+        assert "E514" in [finding.code for finding in actual], card
 
 
 def test_no_deck_of_the_project_has_a_field_that_no_macro_uses() -> None:

@@ -164,13 +164,13 @@ def test_a_plate_that_is_not_held_has_no_static_solution(tmp_path: Path) -> None
 
 
 def test_natural_frequencies_are_mindlins_with_either_mass() -> None:
-    found = run(MODES).modes
-    assert found.number.tolist() == [1, 2, 3, 4] * 2
+    actual = run(MODES).modes
+    assert actual.number.tolist() == [1, 2, 3, 4] * 2
     with (DATA / "freq_ssss_mindlin.csv").open() as file:
         rows = [r for r in csv.DictReader(file) if "h/a=0.1 ks=1.0" in r["case"]]
     scale = np.sqrt(RIGIDITY / 0.1)  # omega a^2 sqrt(rho h/D)
     exact = [float(r["omega_flex_rad/s_or_nondim"]) * scale for r in rows[:3]]
-    lumped, consistent = found.angular_frequency[:4], found.angular_frequency[4:]
+    lumped, consistent = actual.angular_frequency[:4], actual.angular_frequency[4:]
     for omega in (lumped, consistent):
         assert omega[0] == pytest.approx(exact[0], rel=1e-3)
         assert omega[1] == pytest.approx(exact[1], rel=1e-2)
@@ -334,9 +334,11 @@ def test_displacements_without_impact_steps_and_impact_steps_without_displacemen
 def test_a_loop_inside_the_loop_of_impact_steps_runs_at_every_pass() -> None:
     every = PROGRAM.replace("DISP          5", "DISP")
     inside = PROGRAM.replace("DISP          5", "LOOP          1\nDISP\nNEXT")
-    found, expected = run(small(inside)).tape3, run(small(every)).tape3
-    assert found.step.tolist() == list(range(1, 11))
-    np.testing.assert_allclose(found.w, expected.w, rtol=0.0, atol=1e-12 * np.abs(expected.w).max())
+    actual, expected = run(small(inside)).tape3, run(small(every)).tape3
+    assert actual.step.tolist() == list(range(1, 11))
+    np.testing.assert_allclose(
+        actual.w, expected.w, rtol=0.0, atol=1e-12 * np.abs(expected.w).max()
+    )
 
 
 def test_central_differences_and_impact_steps_share_one_plate() -> None:

@@ -50,9 +50,9 @@ def test_published_plies_have_the_published_values(
 ) -> None:
     material = MATERIALS[name]
     assert (material.ply.e1, material.ply.e2, material.ply.g12) == moduli
-    found = material.allowables("mm-N-s")
-    assert found is not None
-    assert (found.xt, found.xc, found.yt, found.yc, found.s12) == strengths
+    actual = material.allowables("mm-N-s")
+    assert actual is not None
+    assert (actual.xt, actual.xc, actual.yt, actual.yc, actual.s12) == strengths
 
 
 @pytest.mark.parametrize("name", MATERIALS)

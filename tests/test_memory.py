@@ -193,9 +193,9 @@ def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
     deck.write_text(small().replace("DISP          5", "DISP"))
     done = call("run", deck, "-o", output)
     assert (done.exit_code, done.stdout) == (2, "")
-    told = done.stderr.splitlines()[-1]
-    assert told.startswith("fecm: error: the run takes about ")
-    assert "MB of memory, and 2 MB are free" in told
+    message = done.stderr.splitlines()[-1]
+    assert message.startswith("fecm: error: the run takes about ")
+    assert "MB of memory, and 2 MB are free" in message
     assert not output.exists()
 
 
@@ -372,10 +372,10 @@ def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
     vary = ("--vary", "velocity=50:100:3000", "-o", tmp_path / "s.h5")
     done = call("sweep", deck, *vary, *options)
     assert (done.exit_code, done.stdout) == (2, "")
-    told = done.stderr.splitlines()[-1]
-    assert told.startswith("fecm: error: the sweep takes about ")
-    assert f"MB of memory, and {free} MB are free; take " in told
-    assert remedy in told
+    message = done.stderr.splitlines()[-1]
+    assert message.startswith("fecm: error: the sweep takes about ")
+    assert f"MB of memory, and {free} MB are free; take " in message
+    assert remedy in message
     assert [path.name for path in tmp_path.iterdir()] == ["small.inp"]
 
 
@@ -387,8 +387,8 @@ def test_matrices_that_do_not_fit_are_refused(
     model = build_plate(problem.deck, problem.mesh)
     monkeypatch.setattr(fecm._machine, "available_memory", lambda: 101 * MEGABYTE)
     # 24 bytes for each of the 45 x 45 entries of 2116 matrices.
-    told = "assemble the plate's matrices takes about 103 MB of memory, and 101 MB are free"
-    with pytest.raises(NotEnoughMemoryError, match=told):
+    message = "assemble the plate's matrices takes about 103 MB of memory, and 101 MB are free"
+    with pytest.raises(NotEnoughMemoryError, match=message):
         _ = model.stiffness
     assert critical_time_step(model) > 0.0  # for which no matrix is assembled
 
@@ -455,8 +455,8 @@ def test_free_memory_is_that_of_psutil_where_the_system_has_no_file_of_it(
 ) -> None:
     monkeypatch.setattr(fecm._machine, "MEMINFO", tmp_path / "missing")
     monkeypatch.setattr(fecm._machine, "_of_groups", list)
-    told = SimpleNamespace(virtual_memory=lambda: SimpleNamespace(available=5 * MEGABYTE))
-    monkeypatch.setitem(sys.modules, "psutil", told)
+    message = SimpleNamespace(virtual_memory=lambda: SimpleNamespace(available=5 * MEGABYTE))
+    monkeypatch.setitem(sys.modules, "psutil", message)
     assert available_memory() == 5 * MEGABYTE
     monkeypatch.setitem(sys.modules, "psutil", None)
     assert available_memory() is None

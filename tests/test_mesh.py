@@ -95,17 +95,17 @@ def test_a_blank_increment_of_elements_is_one_and_absent_nodes_stay_absent() -> 
 
 def test_negative_codes_carry_on_through_generated_nodes_and_positive_ones_do_not() -> None:
     cards = Boundary((NodeCodes(1, 2, (-1, 1, 0, 0, 0)), NodeCodes(7, 0, (0, 0, 1, 0, 0))))
-    made = mesh(cards).codes
-    assert made[:, 0].tolist() == [-1, 0, -1, 0, -1, 0, -1, 0, 0]
-    assert made[:, 1].tolist() == [1, 0, 0, 0, 0, 0, 0, 0, 0]
-    assert made[:, 2].tolist() == [0, 0, 0, 0, 0, 0, 1, 0, 0]
+    built = mesh(cards).codes
+    assert built[:, 0].tolist() == [-1, 0, -1, 0, -1, 0, -1, 0, 0]
+    assert built[:, 1].tolist() == [1, 0, 0, 0, 0, 0, 0, 0, 0]
+    assert built[:, 2].tolist() == [0, 0, 0, 0, 0, 0, 1, 0, 0]
 
 
 def test_a_negative_code_reaches_the_next_card_even_without_an_increment() -> None:
     cards = Boundary((NodeCodes(1, 0, (-1, -1, 0, 0, 0)), NodeCodes(5, 0, (0, 1, 0, 0, 0))))
-    made = mesh(cards).codes
-    assert made[4].tolist() == [-1, 1, 0, 0, 0]
-    assert not made[1:4].any()
+    built = mesh(cards).codes
+    assert built[4].tolist() == [-1, 1, 0, 0, 0]
+    assert not built[1:4].any()
 
 
 def test_codes_carry_on_downwards_too() -> None:
@@ -115,14 +115,14 @@ def test_codes_carry_on_downwards_too() -> None:
 
 def test_equations_are_numbered_by_node_and_unknown() -> None:
     cards = Boundary((NodeCodes(1, 1, (-1, -1, 0, 0, 0)), NodeCodes(3, 0, (1, 1, 1, 0, 0))))
-    made = mesh(cards, numnp=4)
-    assert made.equations.tolist() == [
+    built = mesh(cards, numnp=4)
+    assert built.equations.tolist() == [
         [0, 0, 1, 2, 3],
         [0, 0, 4, 5, 6],
         [0, 0, 0, 7, 8],
         [9, 10, 11, 12, 13],
     ]
-    assert made.number_of_equations == 13
+    assert built.number_of_equations == 13
 
 
 @pytest.mark.parametrize(

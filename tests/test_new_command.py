@@ -333,8 +333,8 @@ def test_the_edges_of_a_plate_that_stretches_are_held_in_the_plane_as_asked(
     bottom: list[bool],
 ) -> None:
     asked = () if in_plane is None else ("--in-plane", in_plane)
-    found = held_in_plane(*plate, "--support", support, *asked)
-    assert found == {
+    actual = held_in_plane(*plate, "--support", support, *asked)
+    assert actual == {
         "left": left,
         "right": left,
         "bottom": bottom,
@@ -384,8 +384,8 @@ def test_a_coupled_laminate_slides_on_the_window_of_a_fixture() -> None:
         assert ("! The plate slides on the window" in answer.stdout) == (in_plane is None)
         (problem,) = load_deck(answer.stdout).problems
         assert problem.contact is not None
-        found = static_stiffness(problem.moving_plate, problem.contact)
-        assert found == pytest.approx(expected, rel=0.015)
+        actual = static_stiffness(problem.moving_plate, problem.contact)
+        assert actual == pytest.approx(expected, rel=0.015)
 
 
 def test_as_many_dofs_are_pinned_as_rigid_motions_in_the_plane_are_free() -> None:
@@ -497,8 +497,8 @@ def test_check_says_how_much_equilibrium_changes_the_static_deflection() -> None
     )
     expected = other / one - 1.0
     assert expected > 0.1
-    found = summary_of(deck)
-    assert found["equilibrium_change"] == pytest.approx(expected, rel=2e-3)
+    actual = summary_of(deck)
+    assert actual["equilibrium_change"] == pytest.approx(expected, rel=2e-3)
 
 
 def summary_of(deck: str) -> dict[str, float | None]:

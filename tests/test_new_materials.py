@@ -159,7 +159,7 @@ def test_k_is_that_of_the_laminate_under_the_impact() -> None:
     sphere = ("--contact", "estimate:8")
     glass = new("--layup", "[0]8", "--material", "E-glass/MY750", "--ply-thickness", ".25", *sphere)
     both = new(*HYBRID, *zone, *sphere)
-    k = [fecm.read_one(made.stdout).require(Indentation).k for made in (glass, both)]
+    k = [fecm.read_one(built.stdout).require(Indentation).k for built in (glass, both)]
     assert k[0] == k[1]
 
 
@@ -210,8 +210,8 @@ def test_objects_make_the_same_deck() -> None:
     direct = fecm.Laminate([(0, "IM7/8552", 0.125), (90, "E-glass/MY750", 0.25)])
     for laminate in (text, tuples):
         assert laminate.thickness == 0.75
-        made = objects(laminate, zones=[((10, 10, 30, 20), "[0C/90G]2s")])
-        assert made.to_text() == wanted
+        built = objects(laminate, zones=[((10, 10, 30, 20), "[0C/90G]2s")])
+        assert built.to_text() == wanted
     own = objects(text, zones=[((10, 10, 30, 20), direct)])
     assert rows(own, 2) == [(0, 0.125, 3), (90, 0.25, 4)]
 
@@ -232,10 +232,10 @@ def test_groups_of_surfaces_carry_laminates() -> None:
         [4, 5, 8],
         [4, 8, 7],
     ]
-    made = plate_mesh(points, cells, {}, surfaces={"pad": [2, 3]})
-    centres = made.points[made.cells].mean(axis=1)
+    built = plate_mesh(points, cells, {}, surfaces={"pad": [2, 3]})
+    centres = built.points[built.cells].mean(axis=1)
     inside = np.flatnonzero((centres[:, 0] > 10) & (centres[:, 1] < 10))
-    assert made.surfaces["pad"].tolist() == inside.tolist()
+    assert built.surfaces["pad"].tolist() == inside.tolist()
 
 
 def test_physical_surfaces_of_gmsh_carry_laminates(tmp_path: Path) -> None:

@@ -90,11 +90,11 @@ def test_supports_in_the_plane_at_single_nodes_are_enough() -> None:
 
 @pytest.mark.parametrize("word", ["NONL", "PREL"])
 def test_listing_mode_refuses_the_word(word: str) -> None:
-    made = fecm.read_one(deck(preload=(5, 5)).to_text())
+    built = fecm.read_one(deck(preload=(5, 5)).to_text())
     other = Preload if word == "NONL" else Nonlinear
-    left = tuple(s for s in made.segments if not isinstance(s, other))
-    found = load_deck(replace(made, segments=left, text="").to_text(), "listing").errors()
-    assert f"The printed program has no {word}." in [finding.message for finding in found]
+    left = tuple(s for s in built.segments if not isinstance(s, other))
+    actual = load_deck(replace(built, segments=left, text="").to_text(), "listing").errors()
+    assert f"The printed program has no {word}." in [finding.message for finding in actual]
 
 
 def test_a_nonlinear_plate_has_no_sparse_matrix_and_no_transposed_jacobian(tmp_path: Path) -> None:
@@ -329,8 +329,8 @@ def test_displaced_edges_before_an_impact_are_the_preload_of_their_strain() -> N
 def test_a_swept_preload_is_that_of_a_deck_changed_by_hand() -> None:
     text = fecm.impact(plate(), PLIES, MASS, LAW, **QUICK).to_text()
     by_hand = fecm.read_one(text.replace("EXPE\n", "PREL\n20.,0.,-3.\nEXPE\n"))
-    made = fecm.read_one(text).with_(preload_x=20.0, preload_xy=-3.0)
-    assert made.require(Preload) == by_hand.require(Preload)
+    built = fecm.read_one(text).with_(preload_x=20.0, preload_xy=-3.0)
+    assert built.require(Preload) == by_hand.require(Preload)
     again = by_hand.with_(preload_y=7.0)
     assert again.require(Preload) == Preload(20.0, 7.0, -3.0)
     assert len(again.all(Preload)) == 1

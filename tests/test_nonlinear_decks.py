@@ -66,11 +66,11 @@ def result(*args: str, **kwargs: str) -> fecm.Result:
 
 
 def test_newtons_method_ends_in_equilibrium_with_the_supports() -> None:
-    found = result(NEWTON + "DISP\nREAC\n", data=forces(2000.0))
-    w = found.tape3.w[0, 12]
+    actual = result(NEWTON + "DISP\nREAC\n", data=forces(2000.0))
+    w = actual.tape3.w[0, 12]
     linear = result("TANG\nFORM\nSOLV\nDISP\n", data=forces(2000.0), words="").tape3.w[0, 12]
     assert 2.0 * THICKNESS < w < 0.5 * linear
-    force = found.reactions.force[0]
+    force = actual.reactions.force[0]
     inside = np.setdiff1d(np.arange(25), np.array(EDGE) - 1)
     assert np.abs(force[inside]).max() < 1e-8
     assert force[:, 2].sum() == pytest.approx(-2000.0, rel=1e-9)
@@ -132,8 +132,8 @@ def test_an_impact_on_displaced_edges_is_that_on_the_preload_of_the_card() -> No
     assert np.abs(without.history.force - by_card.history.force).max() > 1e-3 * peak
     # The balance is as good as that of the linear plate.
     linear = np.abs(result(STEPS, data=STRUCK, words="").energy.balance_error).max()
-    for found in (by_edges, by_card, without):
-        assert np.abs(found.energy.balance_error).max() < 1.05 * linear
+    for actual in (by_edges, by_card, without):
+        assert np.abs(actual.energy.balance_error).max() < 1.05 * linear
 
 
 # Macro 14 is the last FORM: its SOLV belongs to the resumed run.

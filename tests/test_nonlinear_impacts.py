@@ -41,15 +41,15 @@ Row = dict[str, str]
 LONGER = 1.02
 
 
-def worst_balance(found: Result) -> float:
+def worst_balance(result: Result) -> float:
     """Largest error of the energy balance, relative to the initial energy."""
-    energy = found.energy
+    energy = result.energy
     return float(np.abs(energy.balance_error).max() / energy.attributes["initial"])
 
 
-def contact_end(found: Result) -> float:
+def contact_end(result: Result) -> float:
     """Time at which the force was last above zero."""
-    return float(found.time[found.force > 0.0][-1])
+    return float(result.time[result.force > 0.0][-1])
 
 
 def struck(row: Row, n: int) -> Result:
@@ -74,13 +74,13 @@ def rows(name: str, key: str, quick: set[tuple[str, str]]) -> list[object]:
 
 
 def test_an_impact_of_a_ten_thousandth_of_the_velocity_is_that_of_the_linear_plate() -> None:
-    made = struck_rectangle("iso_clamped_immovable", 8, 1e-4 * 2271.56, 4e-4)
-    linear, found = run_of_deck(without_nonlinearity(made)), run_of_deck(made)
+    built = struck_rectangle("iso_clamped_immovable", 8, 1e-4 * 2271.56, 4e-4)
+    linear, actual = run_of_deck(without_nonlinearity(built)), run_of_deck(built)
     peak = linear.force.max()
     assert peak > 0.0
-    assert np.abs(found.force - linear.force).max() < 1e-6 * peak
-    assert np.abs(found.plate_w - linear.plate_w).max() < 1e-6 * linear.plate_w.max()
-    assert not np.array_equal(found.force, linear.force)
+    assert np.abs(actual.force - linear.force).max() < 1e-6 * peak
+    assert np.abs(actual.plate_w - linear.plate_w).max() < 1e-6 * linear.plate_w.max()
+    assert not np.array_equal(actual.force, linear.force)
 
 
 # Free vibration after a pulse ---------------------------------------------------------------------
@@ -222,9 +222,9 @@ def test_an_impact_on_a_coarse_disc_deflects_it_as_the_axisymmetric_solution() -
 @pytest.mark.long
 def test_a_run_does_not_depend_on_the_number_of_threads(tmp_path: Path) -> None:
     # Half of the plate, which is what the kernels compute, has several parts for the threads.
-    made = with_rows(struck_rectangle("iso_clamped_immovable", 56, 2271.56, 3e-6), 10)
+    built = with_rows(struck_rectangle("iso_clamped_immovable", 56, 2271.56, 3e-6), 10)
     for threads in (1, 2):
-        fecm.run_one(made, output=tmp_path / f"{threads}.h5", threads=threads)
+        fecm.run_one(built, output=tmp_path / f"{threads}.h5", threads=threads)
     assert (tmp_path / "1.h5").read_bytes() == (tmp_path / "2.h5").read_bytes()
 
 

@@ -116,15 +116,15 @@ def test_the_forces_of_a_stretched_plate_are_numpys(
     plate = plate_of(MESHES[name](5, 4, 9), LAMINATES[laminate], preload=preload)
     plate = replace(plate, curvature=curvature)
     for kept in unreduced(plate), symmetry_reduction(plate, None):
-        found, linear = products(plate, kept)
+        actual, linear = products(plate, kept)
         wanted = NonlinearProduct(plate, kept, linear)
         u = 0.1 * np.random.default_rng(0).standard_normal(kept.count)
         forces = wanted(u)
         size = np.abs(forces).max()
         assert np.abs(forces - linear(u)).max() > 0.1 * size
         close = (5e-15 if curvature == FLAT else 1e-14) * size
-        np.testing.assert_allclose(found(u), forces, rtol=0.0, atol=close)
-        assert found.quadratic_work == pytest.approx(wanted.quadratic_work, rel=1e-13)
+        np.testing.assert_allclose(actual(u), forces, rtol=0.0, atol=close)
+        assert actual.quadratic_work == pytest.approx(wanted.quadratic_work, rel=1e-13)
 
 
 @compiled
@@ -227,14 +227,14 @@ IMPACTS = {
 @pytest.mark.parametrize("name", IMPACTS)
 @pytest.mark.few(1)  # of 4, 0.3 s each
 def test_an_impact_on_a_stretched_plate_is_that_of_numpy(name: str) -> None:
-    found, wanted = (fecm.run_one(IMPACTS[name], solver=s) for s in ("kernels", "numpy"))
-    assert_close(found, wanted)
-    assert found.plate_w.max() > 0.053
+    actual, wanted = (fecm.run_one(IMPACTS[name], solver=s) for s in ("kernels", "numpy"))
+    assert_close(actual, wanted)
+    assert actual.plate_w.max() > 0.053
     if "linear" not in name:
         linear = fecm.run_one(IMPACTS[name].replace("NONL\n", ""), solver="kernels")
-        assert np.abs(found.force - linear.force).max() > 0.1 * found.force.max()
-    initial = found.attributes_of("energy")["initial"]
-    assert np.abs(found["energy/balance_error"]).max() < 1e-4 * initial
+        assert np.abs(actual.force - linear.force).max() > 0.1 * actual.force.max()
+    initial = actual.attributes_of("energy")["initial"]
+    assert np.abs(actual["energy/balance_error"]).max() < 1e-4 * initial
 
 
 @compiled

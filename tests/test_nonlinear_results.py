@@ -95,18 +95,18 @@ def test_resultants_are_those_of_the_strains_with_the_slopes() -> None:
     points = plate.strain_field(gauss(2))
     field = inclined(plate)
     quadratic = quadratic_strains_at(points, field)
-    found = strains_and_resultants(points, plate.rows_by_laminate, field, plate.preload, quadratic)
+    actual = strains_and_resultants(points, plate.rows_by_laminate, field, plate.preload, quadratic)
     A, B, D = plate.laminate.A, plate.laminate.B, plate.laminate.D
     N, M = A @ STRETCHED + B @ CURVATURE, B @ STRETCHED + D @ CURVATURE
     names = ["eps_xx", "eps_yy", "gamma_xy", "N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy"]
     for name, value in zip(names, [*STRETCHED, *N, *M], strict=True):
-        np.testing.assert_allclose(found[name], value, rtol=1e-10, err_msg=name)
+        np.testing.assert_allclose(actual[name], value, rtol=1e-10, err_msg=name)
 
 
 def test_stresses_of_plies_are_those_of_the_strains_with_the_slopes() -> None:
     plate = general(distorted_square(2, 2))
     stresses = PlyStresses(plate.mesh, plate.laminate, gauss(2), nonlinear=True)
-    found = stresses.evaluate(inclined(plate))
+    actual = stresses.evaluate(inclined(plate))
     faces = np.cumsum([0.0, *GENERAL_LAYERS]) - sum(GENERAL_LAYERS) / 2.0
     for ply, angle in enumerate(GENERAL_ANGLES):
         c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
@@ -115,7 +115,7 @@ def test_stresses_of_plies_are_those_of_the_strains_with_the_slopes() -> None:
             strain = STRETCHED + faces[ply + face] * np.array(CURVATURE)
             stress = turn @ tensor(turned_stiffness(GENERAL_PLY, angle) @ strain) @ turn.T
             for name, at in (("sigma_1", (0, 0)), ("sigma_2", (1, 1)), ("tau_12", (0, 1))):
-                np.testing.assert_allclose(found[name][:, :, ply, face], stress[at], rtol=1e-10)
+                np.testing.assert_allclose(actual[name][:, :, ply, face], stress[at], rtol=1e-10)
 
 
 def test_interlaminar_stresses_follow_from_the_derivatives_of_the_squares() -> None:
@@ -125,14 +125,14 @@ def test_interlaminar_stresses_follow_from_the_derivatives_of_the_squares() -> N
     field[:, 0] = 0.7 * x * y
     field[:, 2] = 0.3 * x + 0.1 * y + 0.2 * x**2 - 0.4 * x * y + 0.5 * y**2
     stresses = PlyStresses(plate.mesh, plate.laminate, gauss(2), nonlinear=True)
-    _, (found,) = stresses.strains(field)
+    _, (actual,) = stresses.strains(field)
     x, y = x[8], y[8]
     w_x, w_y = 0.3 + 0.4 * x - 0.4 * y, 0.1 - 0.4 * x + y
     w_xx, w_yy, w_xy = 0.4, 1.0, -0.4
     # eps_xx = 0.7 y + w_x^2/2, eps_yy = w_y^2/2, gamma_xy = 0.7 x + w_x w_y
     by_x = [w_x * w_xx, w_y * w_xy, 0.7 + w_xx * w_y + w_x * w_xy]
     by_y = [0.7 + w_x * w_xy, w_y * w_yy, w_xy * w_y + w_x * w_yy]
-    np.testing.assert_allclose(found[:, :3], [by_x, by_y], atol=1e-12)
+    np.testing.assert_allclose(actual[:, :3], [by_x, by_y], atol=1e-12)
 
 
 @pytest.mark.parametrize("preload", [(0.0, 0.0, 0.0), (3.0, -1.0, 0.5)])
@@ -141,28 +141,28 @@ def test_energies_and_largest_values_are_those_of_a_constant_field(
 ) -> None:
     plate = general(square(2, 3), preload=preload)
     A, B, D, S = (getattr(plate.laminate, name) for name in ("A", "B", "D", "shear"))
-    found = Stretching(plate, load=(0.5, 0.3)).evaluate(inclined(plate))
+    actual = Stretching(plate, load=(0.5, 0.3)).evaluate(inclined(plate))
     curvature, slope = np.array(CURVATURE), np.array(SLOPE)
     n = A @ STRETCHED + B @ curvature
-    assert found.energy == pytest.approx(0.5 * n @ np.linalg.solve(A, n), rel=1e-10)
+    assert actual.energy == pytest.approx(0.5 * n @ np.linalg.solve(A, n), rel=1e-10)
     # gamma = grad w - theta, which is linear: exact by four points.
     t = np.array([0.5 - 12**-0.5, 0.5 + 12**-0.5])
     gammas = [slope + tensor(curvature * [1, 1, 0.5]) @ (x, y) for x in t for y in t]
     shear = np.mean([0.5 * gamma @ S @ gamma for gamma in gammas])
     elastic = 0.5 * (STRETCHED @ n + curvature @ (B @ STRETCHED + D @ curvature)) + shear
     of_preload = 0.5 * slope @ tensor(preload) @ slope
-    assert found.preload_energy == pytest.approx(of_preload, rel=1e-10)
-    assert found.strain_energy == pytest.approx(elastic + of_preload, rel=1e-10)
-    assert found.largest_slope == pytest.approx(np.hypot(*SLOPE), rel=1e-10)
+    assert actual.preload_energy == pytest.approx(of_preload, rel=1e-10)
+    assert actual.strain_energy == pytest.approx(elastic + of_preload, rel=1e-10)
+    assert actual.largest_slope == pytest.approx(np.hypot(*SLOPE), rel=1e-10)
     N, M = preload + n, B @ STRETCHED + D @ curvature
-    assert found.largest_force == pytest.approx(principal(N)[1], rel=1e-10)
-    assert found.force_at_load == pytest.approx(np.abs(principal(N)).max(), rel=1e-10)
-    assert found.moment_at_load == pytest.approx(np.abs(principal(M)).max(), rel=1e-10)
+    assert actual.largest_force == pytest.approx(principal(N)[1], rel=1e-10)
+    assert actual.force_at_load == pytest.approx(np.abs(principal(N)).max(), rel=1e-10)
+    assert actual.moment_at_load == pytest.approx(np.abs(principal(M)).max(), rel=1e-10)
     half = sum(GENERAL_LAYERS) / 2.0
     middle = STRETCHED + np.linalg.solve(A, preload)
     faces = [(middle + z * curvature) * [1.0, 1.0, 0.5] for z in (-half, half)]
     largest = max(np.abs(principal(face)).max() for face in faces)
-    assert found.largest_strain == pytest.approx(largest, rel=1e-10)
+    assert actual.largest_strain == pytest.approx(largest, rel=1e-10)
 
 
 def test_strains_under_the_load_do_not_count() -> None:
@@ -234,22 +234,22 @@ def static(case: str, deflection: str) -> tuple[dict[str, str], Result]:
 def test_resultants_and_energy_are_those_of_an_independent_solution(
     case: str, deflection: str
 ) -> None:
-    row, found = static(case, deflection)
-    assert found.tape3.w[0, 0] * SCALE == pytest.approx(float(row["w_centre_mm"]), rel=1e-4)
+    row, actual = static(case, deflection)
+    assert actual.tape3.w[0, 0] * SCALE == pytest.approx(float(row["w_centre_mm"]), rel=1e-4)
     # Node 1 of element 1 is the centre; strains are less accurate there than within elements.
-    N, M = found.stresses.N_x[0, 0, 0] * SCALE, found.stresses.M_x[0, 0, 0] * SCALE**2
+    N, M = actual.stresses.N_x[0, 0, 0] * SCALE, actual.stresses.M_x[0, 0, 0] * SCALE**2
     assert float(row["N_x_centre"]) == pytest.approx(N, rel=3e-3)
     assert float(row["M_x_centre"]) == pytest.approx(M, rel=6e-3)
-    energy = 4.0 * found.membrane.strain_energy[0] * SCALE**3
+    energy = 4.0 * actual.membrane.strain_energy[0] * SCALE**3
     assert float(row["strain_energy_mJ"]) == pytest.approx(energy, rel=1e-4)
 
 
 def test_the_summary_of_statics_has_the_share_of_the_membrane() -> None:
-    _, found = static("iso_100x100x2_ss_immovable", "2.0")
-    share = found.membrane.energy[0] / found.membrane.strain_energy[0]
+    _, actual = static("iso_100x100x2_ss_immovable", "2.0")
+    share = actual.membrane.energy[0] / actual.membrane.strain_energy[0]
     assert 0.7 < share < 0.8
     line = f"membrane          {100.0 * share:.0f} % of the strain energy where it is largest"
-    assert line in run_summary(found)
+    assert line in run_summary(actual)
 
 
 GAGES = model.Gages((model.Gage(1, 30.0, 40.0, 1.0, 20.0), model.Gage(2, 50.0, 50.0, -1.0, 0.0)))

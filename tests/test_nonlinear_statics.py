@@ -202,8 +202,8 @@ def test_a_constant_membrane_force_at_finite_slopes_is_exact_on_straight_sided_m
     field, strain = inclined(coordinates)
     quadratic = strain - [3e-3, 1e-3, 2e-3]
     for family in plate.families:
-        found = quadratic_strains(family, RULES.bending, field)
-        np.testing.assert_allclose(found, np.broadcast_to(quadratic[:, None, None], found.shape),
+        actual = quadratic_strains(family, RULES.bending, field)
+        np.testing.assert_allclose(actual, np.broadcast_to(quadratic[:, None, None], actual.shape),
                                    rtol=1e-12)  # fmt: skip
     forces = plate.internal_forces(field) + MembraneForces(plate).forces(field)[0]
     assert np.abs(forces[~held]).max() < 1e-12 * np.abs(forces).max()

@@ -149,16 +149,16 @@ def test_a_circle_of_straight_triangles_on_simple_supports_is_no_stiffer_than_a_
 
 def test_the_centre_of_a_curved_triangle_is_that_of_its_shape_functions() -> None:
     points = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, -0.3), (0.5, 0.5), (0.0, 0.5)]
-    made = fecm.Plate.from_mesh((points, [[0, 1, 2, 3, 4, 5]])).imported
-    assert made is not None
-    np.testing.assert_allclose(made.points[6], [1.0 / 3.0, 0.2], rtol=1e-5)
+    built = fecm.Plate.from_mesh((points, [[0, 1, 2, 3, 4, 5]])).imported
+    assert built is not None
+    np.testing.assert_allclose(built.points[6], [1.0 / 3.0, 0.2], rtol=1e-5)
 
 
 def test_a_group_of_the_boundary_does_not_hold_a_side_inside() -> None:
     cells = [[0, 1, 2], [0, 2, 3]]
-    made = fecm.Plate.from_mesh((SQUARE, cells), groups={"edge": [0, 1, 2, 3]}).imported
-    assert made is not None
-    on = made.points[made.groups["edge"]]
+    built = fecm.Plate.from_mesh((SQUARE, cells), groups={"edge": [0, 1, 2, 3]}).imported
+    assert built is not None
+    on = built.points[built.groups["edge"]]
     assert len(on) == 8
     assert ((on == 0.0) | (on == 1.0)).any(axis=1).all()
 
@@ -170,10 +170,10 @@ def test_an_imported_mesh_passes_the_patch_test(path: Path, mirrored: bool) -> N
     read = meshio.read(path)
     if mirrored:  # every element runs clockwise
         read.points[:, 0] *= -1.0
-    made = fecm.Plate.from_mesh(read).imported
-    assert made is not None
-    mesh = made.points, (made.cells + 1).astype(np.int32)
-    assert residual(mesh, stretched(made.points, STRAIN)) < 1e-12
+    built = fecm.Plate.from_mesh(read).imported
+    assert built is not None
+    mesh = built.points, (built.cells + 1).astype(np.int32)
+    assert residual(mesh, stretched(built.points, STRAIN)) < 1e-12
 
 
 TWO = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (0.0, 1.0), (1.0, 1.0), (2.0, 1.0)]
@@ -189,9 +189,9 @@ def test_a_med_file_that_was_converted_from_gmsh_has_the_groups_numbers(tmp_path
     mesh = meshio.Mesh(points, cells, cell_data={"gmsh:physical": tags}, field_data=names)
     mesh.write(tmp_path / "two.med")
     assert meshio.read(tmp_path / "two.med").field_data  # which names no groups in such a file
-    made = imported(tmp_path / "two.med", {"1": "clamped", "2": "free"}).imported
-    assert made is not None
-    assert {name: group.tolist() for name, group in made.groups.items()} == {
+    built = imported(tmp_path / "two.med", {"1": "clamped", "2": "free"}).imported
+    assert built is not None
+    assert {name: group.tolist() for name, group in built.groups.items()} == {
         "1": [0, 3], "2": [2, 5]
     }  # fmt: skip
 
@@ -209,23 +209,23 @@ def test_the_families_of_a_med_file_are_its_groups_of_lines_nodes_and_elements(
     mesh.cell_tags = {-1: ["left", "ends"], -2: ["ends"], -3: ["thick"]}
     mesh.point_tags = {3: ["seam"]}
     mesh.write(tmp_path / "two.med")
-    made = imported(tmp_path / "two.med").imported
-    assert made is not None
-    assert {name: group.tolist() for name, group in made.groups.items()} == {
+    built = imported(tmp_path / "two.med").imported
+    assert built is not None
+    assert {name: group.tolist() for name, group in built.groups.items()} == {
         "left": [0, 3], "ends": [0, 2, 3, 5], "seam": [1, 4]
     }  # fmt: skip
-    assert {name: zone.tolist() for name, zone in made.surfaces.items()} == {"thick": [1]}
+    assert {name: zone.tolist() for name, zone in built.surfaces.items()} == {"thick": [1]}
 
 
 def test_a_grid_of_pyvista_is_the_plate_that_meshio_reads_from_the_same_file() -> None:
     pyvista = pytest.importorskip("pyvista")
     plate = imported(HOLE, {"clamped": "clamped"}).imported
-    made = fecm.Plate.from_mesh(pyvista.read_meshio(HOLE)).imported
+    built = fecm.Plate.from_mesh(pyvista.read_meshio(HOLE)).imported
     assert plate is not None
-    assert made is not None
-    np.testing.assert_array_equal(made.points, plate.points)
-    np.testing.assert_array_equal(made.cells, plate.cells)
-    groups = [{tuple(group) for group in one.groups.values()} for one in (made, plate)]
+    assert built is not None
+    np.testing.assert_array_equal(built.points, plate.points)
+    np.testing.assert_array_equal(built.cells, plate.cells)
+    groups = [{tuple(group) for group in one.groups.values()} for one in (built, plate)]
     assert groups[0] == groups[1]
     flat = fecm.Plate.from_mesh(pyvista.Plane(i_size=3, j_size=2, i_resolution=3, j_resolution=2))
     assert flat.imported is not None
@@ -276,17 +276,20 @@ def test_every_family_fills_its_area_counter_clockwise(
     points: list[tuple[float, float]], cells: list[list[int]], elements: int, clockwise: bool
 ) -> None:
     plate = fecm.Plate.from_mesh((points, turned(cells) if clockwise else cells), "clamped")
-    made = plate.imported
-    assert made is not None
-    assert made.elements == elements
-    x, y = np.moveaxis(made.points[made.cells[:, :4]], 2, 0)
+    built = plate.imported
+    assert built is not None
+    assert built.elements == elements
+    x, y = np.moveaxis(built.points[built.cells[:, :4]], 2, 0)
     areas = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) / 2.0
     assert (areas > 0.0).all()
     assert areas.sum() == pytest.approx(1.0)
-    if made.most_nodes == 9:
-        ends = made.points[made.cells[0, [0, 1, 2, 3]]], made.points[made.cells[0, [1, 2, 3, 0]]]
-        np.testing.assert_allclose(made.points[made.cells[0, 4:8]], sum(ends) / 2.0)
-        np.testing.assert_allclose(made.points[made.cells[0, 8]], 0.5)
+    if built.most_nodes == 9:
+        ends = (
+            built.points[built.cells[0, [0, 1, 2, 3]]],
+            built.points[built.cells[0, [1, 2, 3, 0]]],
+        )
+        np.testing.assert_allclose(built.points[built.cells[0, 4:8]], sum(ends) / 2.0)
+        np.testing.assert_allclose(built.points[built.cells[0, 8]], 0.5)
 
 
 def grid_arrays(*names: str) -> tuple[Any, Any, MeshArrays]:
@@ -344,10 +347,10 @@ def test_the_formats_of_gmsh_give_the_same_plate(tmp_path: Path) -> None:
 
 def test_points_without_an_element_are_dropped() -> None:
     points = [(9.0, 9.0), *SQUARE, (0.5, 0.5)]
-    made = fecm.Plate.from_mesh((points, [[1, 2, 3, 4]]), groups={"edge": [0, 1, 2]}).imported
-    assert made is not None
-    np.testing.assert_array_equal(made.points, SQUARE)
-    np.testing.assert_array_equal(made.groups["edge"], [0, 1])
+    built = fecm.Plate.from_mesh((points, [[1, 2, 3, 4]]), groups={"edge": [0, 1, 2]}).imported
+    assert built is not None
+    np.testing.assert_array_equal(built.points, SQUARE)
+    np.testing.assert_array_equal(built.groups["edge"], [0, 1])
 
 
 @pytest.mark.parametrize(
@@ -430,9 +433,9 @@ def test_an_input_file_of_another_program_is_named_as_such(tmp_path: Path) -> No
 def test_the_mesh_of_another_programs_input_file_can_be_taken(tmp_path: Path) -> None:
     path = tmp_path / "plate.inp"
     path.write_text(ABAQUS)
-    made = imported(path, {"rim": "clamped"}).imported
-    assert made is not None
-    assert (made.nodes, made.elements, made.groups["rim"].tolist()) == (4, 1, [0, 3])
+    built = imported(path, {"rim": "clamped"}).imported
+    assert built is not None
+    assert (built.nodes, built.elements, built.groups["rim"].tolist()) == (4, 1, [0, 3])
     path.write_text(ABAQUS + "*INCLUDE, INPUT=/etc/passwd\n")
     with pytest.raises(ValueError, match="refers to other files, which are not read"):
         imported(path)

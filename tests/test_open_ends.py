@@ -31,12 +31,12 @@ def test_a_contact_is_open_where_the_last_force_is_above_zero(
 def test_a_summary_shows_no_end_of_a_contact_that_has_none() -> None:
     open_, closed = fecm.run_one(small()), fecm.run_one(CLOSED)
     assert (open_.still_in_contact, closed.still_in_contact) == (True, False)
-    told = "\n".join(run_summary(open_))
-    assert "contact           from 5e-07, still in contact at the end" in told
-    assert told.count("permanent open") == 1
-    told = "\n".join(run_summary(closed))
-    assert "still in contact" not in told
-    assert "open" not in told
+    text = "\n".join(run_summary(open_))
+    assert "contact           from 5e-07, still in contact at the end" in text
+    assert text.count("permanent open") == 1
+    text = "\n".join(run_summary(closed))
+    assert "still in contact" not in text
+    assert "open" not in text
 
 
 def test_run_and_info_say_that_a_run_ends_in_contact(tmp_path: Path) -> None:

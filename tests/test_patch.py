@@ -65,8 +65,8 @@ def test_the_compliance_under_a_patch_is_that_of_the_series(shape: str, c: float
         if (row["shape"], row["K"]) == (name, "1") and float(row["c (radius or half side)"]) == c
     )
     mesh = rectangle(round(6 / c), round(4 / c))  # the element's side is c
-    found = compliance(mesh, patch_weights(mesh, shape, c, 3.0, 2.0))
-    assert found == pytest.approx(exact, rel=1e-3)
+    actual = compliance(mesh, patch_weights(mesh, shape, c, 3.0, 2.0))
+    assert actual == pytest.approx(exact, rel=1e-3)
 
 
 @pytest.mark.parametrize(("count", "least"), [(12, 0.1), (36, 0.4)])

@@ -63,8 +63,8 @@ def strike(
         system.advance(state, dt)
         forces.append(state.contact.force)
     history = np.array(forces)
-    found = np.interp(times, dt * np.arange(len(history)), history)
-    return np.asarray(found), float(history.max())
+    actual = np.interp(times, dt * np.arange(len(history)), history)
+    return np.asarray(actual), float(history.max())
 
 
 def series(name: str, columns: tuple[str, str], until: float) -> Floats:
@@ -101,8 +101,8 @@ def test_the_peak_converges_at_a_rate_of_at_least_three_and_a_half() -> None:
     def error(n: int) -> float:
         mesh = rectangle(6 * n, 4 * n)
         weights = patch_weights(mesh, DISC, 0.25, 3.0, 2.0)
-        found = strike(mesh, CROSS_PLY, weights, ELASTIC, (0.000181, 115.0), times)[1]
-        return abs(found / 95.927344 - 1.0)
+        actual = strike(mesh, CROSS_PLY, weights, ELASTIC, (0.000181, 115.0), times)[1]
+        return abs(actual / 95.927344 - 1.0)
 
     coarse, fine = error(2), error(4)  # side 2 c and c
     assert fine < 2e-3
@@ -172,20 +172,20 @@ def test_a_vanishing_patch_on_the_impact_node_is_the_point_force() -> None:
 
 
 def test_the_patch_is_stored_with_its_weights() -> None:
-    found = with_patch("HERT           0.3       0.9       1.0")
-    weights = found["patch/weight"]
-    attributes = found.patch.attributes
+    actual = with_patch("HERT           0.3       0.9       1.0")
+    weights = actual["patch/weight"]
+    attributes = actual.patch.attributes
     assert weights.sum() == pytest.approx(1.0, rel=1e-12)
     assert (attributes["shape"], attributes["radius"]) == ("HERT", 0.3)
     assert (attributes["x"], attributes["y"]) == (0.9, 1.0)
-    places = found["mesh/coordinates"][found["patch/node"] - 1]
+    places = actual["mesh/coordinates"][actual["patch/node"] - 1]
     assert weights @ places == pytest.approx([0.9, 1.0])
 
 
 def test_plate_w_is_the_weighted_mean_of_w() -> None:
-    found = with_patch("DISC,.4,1.1,.95", PROGRAM.replace("DISP          5", "DISP          1"))
-    w = found["tape3/w"][:, found["patch/node"] - 1]
-    np.testing.assert_allclose(found.plate_w, w @ found["patch/weight"], rtol=1e-12)
+    actual = with_patch("DISC,.4,1.1,.95", PROGRAM.replace("DISP          5", "DISP          1"))
+    w = actual["tape3/w"][:, actual["patch/node"] - 1]
+    np.testing.assert_allclose(actual.plate_w, w @ actual["patch/weight"], rtol=1e-12)
 
 
 def test_the_energy_balance_holds_with_a_patch_over_4000_steps() -> None:
@@ -236,8 +236,8 @@ def test_the_peak_on_the_reports_free_plate_does_not_depend_on_the_mesh() -> Non
         held[:, :2] = True
         plate = with_restraints(*mesh, held)
         weights = patch_weights(plate, DISC, radius, 3.0, 2.0)
-        found = strike(plate, report_plate(), weights, ELASTIC, (0.000181, 115.0), times)
-        peaks[every, radius] = found[1]
+        actual = strike(plate, report_plate(), weights, ELASTIC, (0.000181, 115.0), times)
+        peaks[every, radius] = actual[1]
     # Limits of finer meshes: 80.07 and 77.18 lb.
     assert peaks[2, 0.125] == pytest.approx(80.07, rel=1e-2)
     assert peaks[1, 0.125] == pytest.approx(80.07, rel=5e-4)

@@ -105,10 +105,10 @@ def test_strains_of_constant_curvature_are_exact_at_gauss_and_at_nodal_points(
     maker: MeshMaker, kind: int, rule: Quadrature
 ) -> None:
     coordinates, elements = maker(3, 4, kind)
-    found = StrainField(elements, coordinates, rule).evaluate(bent(coordinates, CURVATURE))
-    assert found.shape == (5, 12, len(rule.xi))
+    actual = StrainField(elements, coordinates, rule).evaluate(bent(coordinates, CURVATURE))
+    assert actual.shape == (5, 12, len(rule.xi))
     expected = np.array([*CURVATURE, 0.0, 0.0])[:, None, None]
-    np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), atol=1e-12)
+    np.testing.assert_allclose(actual, np.broadcast_to(expected, actual.shape), atol=1e-12)
 
 
 @pytest.mark.parametrize("rule", [*map(gauss, ORDERS), *map(nodal, ORDERS)])
@@ -119,9 +119,9 @@ def test_a_tilted_midplane_with_upright_normals_is_sheared_by_its_slope(
     coordinates, elements = maker(3, 4, kind)
     field = np.zeros((len(coordinates), 5))
     field[:, 2] = coordinates @ [0.3, -0.7]  # gamma_xz, gamma_yz
-    found = StrainField(elements, coordinates, rule).evaluate(field)
+    actual = StrainField(elements, coordinates, rule).evaluate(field)
     expected = np.array([0.0, 0.0, 0.0, -0.7, 0.3])[:, None, None]
-    np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), atol=1e-12)
+    np.testing.assert_allclose(actual, np.broadcast_to(expected, actual.shape), atol=1e-12)
 
 
 def test_strains_do_not_depend_on_displacements_in_the_plane() -> None:
@@ -257,8 +257,8 @@ def test_the_assembled_stiffness_is_the_sum_of_the_elements() -> None:
         K = element_matrices.stiffness(family, general_plate(), rules()).reshape(9, 5, 9, 5)
         for a, b in product(range(9), repeat=2):
             expected[element[a] - 1, :, element[b] - 1] += K[a, :, b]
-    found = free_stiffness((coordinates, elements))
-    difference = np.abs(found - expected.reshape(found.shape)).max()
+    actual = free_stiffness((coordinates, elements))
+    difference = np.abs(actual - expected.reshape(actual.shape)).max()
     assert difference < 1e-13 * np.abs(expected).max()
 
 
@@ -272,8 +272,8 @@ def test_every_way_to_multiply_by_the_stiffness_gives_the_same_forces(
     u = np.random.default_rng(2).standard_normal(mesh.number_of_equations)
     expected = model.stiffness.toarray() @ u
     for solver in ("", "csr"):
-        found = stiffness_operator(model, solver)(u)
-        np.testing.assert_allclose(found, expected, atol=1e-13 * np.abs(expected).max())
+        actual = stiffness_operator(model, solver)(u)
+        np.testing.assert_allclose(actual, expected, atol=1e-13 * np.abs(expected).max())
 
 
 # The transposed Jacobian -------------------------------------------------------------------------
@@ -308,19 +308,19 @@ def test_the_transposed_jacobian_fails_the_patch_tests() -> None:
     coordinates, elements = mesh = distorted_square(3, 4)
     for field in (stretched(coordinates, STRAIN), bent(coordinates, CURVATURE)):
         assert residual(mesh, field, transposed_jacobian=True) > 1e-3
-        found = equilibrium(patch(mesh, field, transposed_jacobian=True))
-        assert np.abs(found - field).max() > 1e-3
+        actual = equilibrium(patch(mesh, field, transposed_jacobian=True))
+        assert np.abs(actual - field).max() > 1e-3
     strains = StrainField(elements, coordinates, gauss(3), transposed_jacobian=True)
-    found = strains.evaluate(bent(coordinates, CURVATURE))
-    assert np.abs(found[:3] - CURVATURE[:, None, None]).max() > 0.05
-    assert np.abs(found[3:]).max() > 0.01
+    actual = strains.evaluate(bent(coordinates, CURVATURE))
+    assert np.abs(actual[:3] - CURVATURE[:, None, None]).max() > 0.05
+    assert np.abs(actual[3:]).max() > 0.01
 
 
 def test_a_family_holds_the_elements_that_have_the_same_nodes() -> None:
     coordinates, elements = mixed(3, 4, 9)
-    found = element_blocks(elements, coordinates)
-    assert sorted(row for family in found for row in family.rows) == list(range(12))
-    for family in found:
+    actual = element_blocks(elements, coordinates)
+    assert sorted(row for family in actual for row in family.rows) == list(range(12))
+    for family in actual:
         assert len(family.present) == QUADRILATERAL.nodes
         for row, nodes in zip(family.rows, family.nodes, strict=True):
             assert np.array_equal(elements[row] > 0, family.present)

@@ -211,8 +211,8 @@ def errors_of_square(n: int, ratio: float, shear: int, ks: float, label: str) ->
     """Errors of both deflections under unit pressure on n x n 9-node elements, relative."""
     coordinates, elements = mesh = square(n, n)
     loads = simpson_loads(elements, len(coordinates), 1.0 / n**2)
-    found = deflections(mesh, loads, ratio, (3, shear), ks)
-    return np.array(found) / reference_deflections(ratio, label) - 1.0
+    actual = deflections(mesh, loads, ratio, (3, shear), ks)
+    return np.array(actual) / reference_deflections(ratio, label) - 1.0
 
 
 @pytest.mark.parametrize(("ks", "label"), [(1.0, "1.000000"), (5.0 / 6.0, "0.833333")])

@@ -90,10 +90,10 @@ def test_vtkhdf_has_the_laminate_and_the_largest_stress_of_own_plies(
         steps = int(file["VTKHDF/Steps"].attrs["NSteps"])
         np.testing.assert_array_equal(cells["laminate"], plate["mesh/laminate"])  # of all steps
         assert not file["VTKHDF/Steps/CellDataOffsets/laminate"][:].any()
-        found = cells["sigma_1"][:].reshape(steps, 16)[-1]
+        actual = cells["sigma_1"][:].reshape(steps, 16)[-1]
         ply = cells["sigma_1_ply"][:].reshape(steps, 16)[-1]
     stored = plate["plies/sigma_1"][-1]
-    np.testing.assert_array_equal(np.abs(found), np.nanmax(np.abs(stored), axis=(1, 2, 3)))
+    np.testing.assert_array_equal(np.abs(actual), np.nanmax(np.abs(stored), axis=(1, 2, 3)))
     assert ply[[2, 3]].max() == 2
 
 

@@ -62,9 +62,9 @@ def located(**others: Any) -> fecm.Location:
     return fecm.Location(**values | others)
 
 
-def axes_of(found: fecm.Location) -> dict[str, Any]:
+def axes_of(location: fecm.Location) -> dict[str, Any]:
     """Axes of the picture by names, in the order in which they are made."""
-    figure = location_picture(found).figure
+    figure = location_picture(location).figure
     names = ("map", "zoom", "gage 1", "gage 4", "bar", "force")
     return dict(zip(names, figure.axes, strict=True))
 
@@ -122,14 +122,14 @@ def test_a_second_place_is_shown_with_its_misfit_if_there_is_one() -> None:
 
 
 def test_each_gage_has_a_graph_of_its_own_and_all_have_the_same_range() -> None:
-    found = usual()
+    actual = usual()
     for name, values in (("gage 1", 1e-6), ("gage 4", -1e-6)):
-        axes = found[name]
+        axes = actual[name]
         assert axes.get_title(loc="left") == name
         np.testing.assert_allclose(lines(axes)["measured"][1], values * np.arange(1.0, 6.0))
         np.testing.assert_allclose(lines(axes)["fitted"][1], 1.1 * values * np.arange(1.0, 6.0))
-    assert found["gage 1"].get_ylim() == found["gage 4"].get_ylim()
-    assert found["gage 1"].get_ylabel() == "Strain (10⁻⁶)"
+    assert actual["gage 1"].get_ylim() == actual["gage 4"].get_ylim()
+    assert actual["gage 1"].get_ylabel() == "Strain (10⁻⁶)"
 
 
 def test_the_outline_has_the_sides_of_the_plate_and_none_inside() -> None:

@@ -56,8 +56,8 @@ def test_ply_stresses_are_those_of_the_handbook_to_its_printed_digits() -> None:
     strains = np.linalg.solve(stiffness, [100.0, 0.0, 0.0, 15.0, 0.0, 0.0])
     lines = (DATA / "hsb_37103_01_issue_d.csv").read_text().splitlines()
     printed = np.array([line.split(",")[-3:] for line in lines[2:]], dtype=float)
-    found = (in_plane_stresses(plate) @ strains).reshape(8, 3)
-    np.testing.assert_allclose(found, printed, rtol=0.0, atol=6e-4)
+    actual = (in_plane_stresses(plate) @ strains).reshape(8, 3)
+    np.testing.assert_allclose(actual, printed, rtol=0.0, atol=6e-4)
 
 
 @pytest.mark.parametrize(
@@ -74,8 +74,8 @@ def test_the_shear_stiffness_of_equilibrium_is_the_closed_form(
 ) -> None:
     (row,) = (row for row in table("shear_stiffness.csv") if row["laminate"] == name)
     xx, xy, yy = (float(row[f"H {ij}"]) for ij in ("xz,xz", "xz,yz", "yz,yz"))
-    found = equilibrium_shear_stiffness(plate)
-    np.testing.assert_allclose(found, [[xx, xy], [xy, yy]], rtol=1e-8, atol=1e-9 * xx)
+    actual = equilibrium_shear_stiffness(plate)
+    np.testing.assert_allclose(actual, [[xx, xy], [xy, yy]], rtol=1e-8, atol=1e-9 * xx)
 
 
 def test_a_quarter_turn_of_the_laminate_exchanges_the_shear_stiffnesses() -> None:
@@ -175,17 +175,17 @@ def test_stresses_of_paganos_plate_converge_to_first_order_theory(n: int) -> Non
         coordinates, elements = square(n, n)
         mesh = with_restraints(coordinates, elements, nothing(coordinates))
         field, largest = sine_field(coordinates, 0.1)
-        found = PlyStresses(mesh, pagano(h=0.1), gauss(2)).evaluate(field)
+        actual = PlyStresses(mesh, pagano(h=0.1), gauss(2)).evaluate(field)
         (family,) = element_blocks(elements, coordinates)
         values = family.shape.shape_functions(gauss(2).xi, gauss(2).eta, family.present)[0]
         x, y = np.einsum("pn,eni->iep", values, family.coordinates)
         exact = largest["sx(a/2,b/2,+h/2)/(q0 S^2)"] * 100 * np.sin(np.pi * x) * np.sin(np.pi * y)
-        in_plane = np.abs(found["sigma_1"][:, :, 2, 1] - exact).max() / np.abs(exact).max()
+        in_plane = np.abs(actual["sigma_1"][:, :, 2, 1] - exact).max() / np.abs(exact).max()
         x, y = coordinates[elements[:, 8] - 1].T
         exact_xz = largest["txz(0,b/2,0)/(q0 S)"] * 10 * np.cos(np.pi * x) * np.sin(np.pi * y)
         exact_yz = largest["tyz(a/2,0,0)/(q0 S)"] * 10 * np.sin(np.pi * x) * np.cos(np.pi * y)
-        xz = np.abs(found["tau_xz"][:, 1, 1] - exact_xz).max() / np.abs(exact_xz).max()
-        yz = np.abs(found["tau_yz"][:, 1, 1] - exact_yz).max() / np.abs(exact_yz).max()
+        xz = np.abs(actual["tau_xz"][:, 1, 1] - exact_xz).max() / np.abs(exact_xz).max()
+        yz = np.abs(actual["tau_yz"][:, 1, 1] - exact_yz).max() / np.abs(exact_yz).max()
         return in_plane, xz, yz
 
     coarse, fine = errors(n // 2), errors(n)
@@ -203,16 +203,16 @@ def test_second_derivatives_of_a_quadratic_are_exact_on_any_straight_sided_eleme
     (family,) = element_blocks(elements, coordinates)
     x, y = family.coordinates.swapaxes(0, 2).swapaxes(1, 2)
     u = 0.3 + x - 2 * y + 1.5 * x * x - 0.7 * y * y + 0.4 * x * y
-    found = np.einsum("ein,en->ei", second_derivatives(family), u)
-    np.testing.assert_allclose(found, np.tile([3.0, -1.4, 0.4], (len(elements), 1)), atol=1e-10)
+    actual = np.einsum("ein,en->ei", second_derivatives(family), u)
+    np.testing.assert_allclose(actual, np.tile([3.0, -1.4, 0.4], (len(elements), 1)), atol=1e-10)
 
 
 def test_interlaminar_stresses_of_elements_without_nine_nodes_are_nan() -> None:
     coordinates, elements = square(2, 2, 8)
     mesh: MeshArrays = with_restraints(coordinates, elements, nothing(coordinates))
-    found = PlyStresses(mesh, pagano(), gauss(2)).evaluate(np.ones((len(coordinates), 5)))
-    assert np.isnan(found["tau_xz"]).all()
-    assert np.isfinite(found["sigma_1"]).all()
+    actual = PlyStresses(mesh, pagano(), gauss(2)).evaluate(np.ones((len(coordinates), 5)))
+    assert np.isnan(actual["tau_xz"]).all()
+    assert np.isfinite(actual["sigma_1"]).all()
 
 
 # Location of points ------------------------------------------------------------------------------
@@ -226,7 +226,7 @@ def test_points_are_located_in_every_element_that_contains_them() -> None:
     inside = ((points >= 0.0) & (points <= 1.0)).all(axis=1)
     assert set(which) == set(np.flatnonzero(inside))
     values = family.shape.shape_functions(xi[:, 0], xi[:, 1], family.present)[0]
-    found = np.einsum("kn,kni->ki", values, family.coordinates[members])
-    np.testing.assert_allclose(found, points[which], atol=1e-12)
+    actual = np.einsum("kn,kni->ki", values, family.coordinates[members])
+    np.testing.assert_allclose(actual, points[which], atol=1e-12)
     node = coordinates[elements[5, 2] - 1]
     assert len(containing_elements(family, node[None])[0]) == 4

@@ -164,13 +164,13 @@ def test_every_product_with_the_stiffness_sees_the_preload(maker: MeshMaker, kin
 
 def reference_frequencies() -> dict[Force, list[tuple[int, int, float]]]:
     """Half-waves m and n and the frequency in Hz of the modes to 3 x 3, by preload."""
-    found: dict[Force, list[tuple[int, int, float]]] = {}
+    actual: dict[Force, list[tuple[int, int, float]]] = {}
     for row in table("preload_frequencies.csv"):
         force = (float(row["N0x_N_per_mm"]), float(row["N0y_N_per_mm"]), 0.0)
         m, n = int(row["m"]), int(row["n"])
         if max(m, n) <= 3:
-            found.setdefault(force, []).append((m, n, float(row["frequency_Hz"])))
-    return found
+            actual.setdefault(force, []).append((m, n, float(row["frequency_Hz"])))
+    return actual
 
 
 @pytest.mark.parametrize("preload", reference_frequencies())
@@ -316,8 +316,8 @@ def test_findings_follow_the_ratio_to_the_buckling_load() -> None:
     (problem,) = load_deck(preloaded("-300.0")).problems
     critical = 300.0 * problem.buckling_factor
     expected = {0.5: set(), 0.9: set(), 0.92: {"W488"}, 0.999: {"W488"}, 1.001: {"E487"}}
-    for share, found in expected.items():
-        assert codes(preloaded(f"{-share * critical:.6g}")) == found, share
+    for share, actual in expected.items():
+        assert codes(preloaded(f"{-share * critical:.6g}")) == actual, share
 
 
 def test_the_message_names_the_ratio_to_the_buckling_load() -> None:
@@ -424,8 +424,8 @@ def test_ply_stresses_are_those_of_bending_and_of_the_preload() -> None:
     n_x = ((c**2 * one + s**2 * two - 2.0 * c * s * shear) * thickness).sum(axis=-1)
     n_y = ((s**2 * one + c**2 * two + 2.0 * c * s * shear) * thickness).sum(axis=-1)
     n_xy = ((c * s * (one - two) + (c**2 - s**2) * shear) * thickness).sum(axis=-1)
-    for found, expected in ((n_x, 2e-3), (n_y, -1e-3), (n_xy, 5e-4)):
-        np.testing.assert_allclose(found, expected, rtol=2e-4)
+    for actual, expected in ((n_x, 2e-3), (n_y, -1e-3), (n_xy, 5e-4)):
+        np.testing.assert_allclose(actual, expected, rtol=2e-4)
     for name in ("tau_xz", "tau_yz"):
         scale = np.abs(without[f"plies/{name}"]).max()
         change = preloaded_one[f"plies/{name}"] - without[f"plies/{name}"]
@@ -472,8 +472,8 @@ def test_exposures_begin_with_those_of_the_preload(solver: Solver) -> None:
 @pytest.mark.few(1)  # of 2, 0.3 s each
 def test_every_solver_steps_the_preloaded_plate(solver: Solver) -> None:
     text = re.sub(r"(?m)^LOOP(.*\n)*?NEXT\n", STORING, preloaded("-300.,150.,60."))
-    expected, found = (fecm.run_one(text, solver=one) for one in ("numpy", solver))
-    difference = np.abs(found["history/plate_w"] - expected["history/plate_w"]).max()
+    expected, actual = (fecm.run_one(text, solver=one) for one in ("numpy", solver))
+    difference = np.abs(actual["history/plate_w"] - expected["history/plate_w"]).max()
     assert difference < 1e-9 * expected["history/plate_w"].max()
     plain = short_run(base())["history/plate_w"]
     assert np.abs(expected["history/plate_w"] - plain).max() > 1e-3 * plain.max()
@@ -645,5 +645,5 @@ def series_compliance(force: float) -> float:
 @pytest.mark.few(1)  # of 2, 0.2 s each
 def test_the_static_stiffness_of_an_estimate_is_that_of_the_preloaded_plate(case: str) -> None:
     row = summary_of(case)
-    found = quick_estimate(check_deck(struck(16, row, 1e-5))).stiffness
-    assert found == pytest.approx(1.0 / series_compliance(float(row["N0x_N_per_mm"])), rel=2e-3)
+    actual = quick_estimate(check_deck(struck(16, row, 1e-5))).stiffness
+    assert actual == pytest.approx(1.0 / series_compliance(float(row["N0x_N_per_mm"])), rel=2e-3)

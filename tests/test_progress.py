@@ -45,12 +45,12 @@ class Minutes:
 @pytest.fixture
 def minutes(monkeypatch: pytest.MonkeyPatch) -> Minutes:
     """Minutes that the test lets pass, and the lines that they bring."""
-    made = Minutes()
+    built = Minutes()
     # A module of its own, because threads use the events of the true one.
-    own = SimpleNamespace(Event=lambda: made, Thread=threading.Thread)
+    own = SimpleNamespace(Event=lambda: built, Thread=threading.Thread)
     monkeypatch.setattr(common, "threading", own)
-    monkeypatch.setattr(common, "echo", lambda text, *, err: made.lines.put(text))
-    return made
+    monkeypatch.setattr(common, "echo", lambda text, *, err: built.lines.put(text))
+    return built
 
 
 def test_a_command_without_a_terminal_says_every_minute_how_far_it_is(minutes: Minutes) -> None:
@@ -134,8 +134,8 @@ def test_a_fit_says_how_many_forces_it_has_computed(tmp_path: Path) -> None:
     for name in ("impact-patch.inp", "measured-force.csv"):
         call("example", name, cwd=tmp_path)
     done = call("identify", "impact-patch.inp", "measured-force.csv", "--free", "k", cwd=tmp_path)
-    told = re.findall(r"^fecm: (\d+) trial forces after 1 min$", done.stderr, re.M)
-    numbers = list(map(int, told))
+    text = re.findall(r"^fecm: (\d+) trial forces after 1 min$", done.stderr, re.M)
+    numbers = list(map(int, text))
     assert numbers == sorted(numbers)
     assert numbers[0] == 0
     assert numbers[-1] > 5

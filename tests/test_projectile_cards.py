@@ -136,8 +136,8 @@ def test_odd_but_possible_values_are_warned_of() -> None:
 def test_a_gage_within_the_thickness_of_a_point_force_is_warned_of(
     x: float, patch: str, warned: bool
 ) -> None:
-    found = codes(with_segment(f"{patch}GAGE\n1, {x}, 1.0, 0.05, 0.\n\n"))
-    assert ("W452" in found) == warned
+    actual = codes(with_segment(f"{patch}GAGE\n1, {x}, 1.0, 0.05, 0.\n\n"))
+    assert ("W452" in actual) == warned
 
 
 def test_a_shear_correction_scales_the_transverse_shear_stiffness_alone() -> None:
@@ -270,8 +270,8 @@ def test_gages_are_read_at_every_step_and_agree_with_the_stored_strains() -> Non
     np.testing.assert_array_equal(result.gages.time, result.time)
     for row, step in enumerate(result.tape8.step):
         curvatures = (result.tape8.kappa_x[row, 0, 8], result.tape8.kappa_y[row, 0, 8])
-        found = result.gages.strain[step - 1]
-        np.testing.assert_allclose(found, [0.04 * curvatures[0], -0.04 * curvatures[1]], rtol=1e-9)
+        actual = result.gages.strain[step - 1]
+        np.testing.assert_allclose(actual, [0.04 * curvatures[0], -0.04 * curvatures[1]], rtol=1e-9)
     assert np.abs(result.gages.strain).max() > 1e-8
 
 

@@ -56,19 +56,19 @@ def test_the_examples_in_the_docstrings_give_what_they_show(
 
 @pytest.mark.parametrize("deck", [WRONG[0], APPENDIX], ids=["wrong", "sound"])
 def test_a_check_in_python_says_what_the_command_prints(deck: Path) -> None:
-    found = fecm.check(deck)
+    actual = fecm.check(deck)
     printed = call("check", deck)
-    assert f"{found}\n" == printed.stdout
-    assert found.ok == (printed.exit_code == 0)
+    assert f"{actual}\n" == printed.stdout
+    assert actual.ok == (printed.exit_code == 0)
     lines = call("check", deck, "--format", "json").stdout.splitlines()
-    assert [json.loads(line) for line in lines] == jsonable(found.to_dicts())
+    assert [json.loads(line) for line in lines] == jsonable(actual.to_dicts())
 
 
 def test_a_deck_with_errors_is_an_answer_and_no_exception() -> None:
-    found = fecm.check(small(data=DATA_CARDS.replace("  1150000.", "       0.0")))
-    assert not found.ok
-    assert [finding.code for finding in found.errors] == ["E403"]
-    assert found.problems == ()
+    actual = fecm.check(small(data=DATA_CARDS.replace("  1150000.", "       0.0")))
+    assert not actual.ok
+    assert [finding.code for finding in actual.errors] == ["E403"]
+    assert actual.problems == ()
     with pytest.raises(fecm.DeckError):
         fecm.run_one(small(data=DATA_CARDS.replace("  1150000.", "       0.0")))
 
@@ -91,9 +91,9 @@ def test_listing_mode_refuses_what_the_printed_program_lacks_and_other_modes_are
 
 
 def test_a_check_goes_to_another_process_and_back() -> None:
-    found = pickle.loads(pickle.dumps(fecm.check(APPENDIX)))
-    assert str(found) == str(fecm.check(APPENDIX))
-    assert found.problems[0].D[0, 0] == pytest.approx(1287.414844365, rel=1e-10)
+    actual = pickle.loads(pickle.dumps(fecm.check(APPENDIX)))
+    assert str(actual) == str(fecm.check(APPENDIX))
+    assert actual.problems[0].D[0, 0] == pytest.approx(1287.414844365, rel=1e-10)
 
 
 # Comparisons -------------------------------------------------------------------------------------

@@ -60,9 +60,9 @@ def test_the_effective_rigidity_is_near_olssons_for_orthotropic_laminates(
     row: dict[str, str],
 ) -> None:
     d11, d12, d22, d66 = (float(row[name]) for name in ("D11", "D12", "D22", "D66"))
-    found = effective_rigidity(with_stiffness([[d11, d12, 0.0], [d12, d22, 0.0], [0.0, 0.0, d66]]))
-    assert found == pytest.approx(float(row["D*"]), rel=0.01)
-    assert found >= float(row["D*"]) * (1.0 - 1e-7)  # an arithmetic-geometric mean's lower bound
+    actual = effective_rigidity(with_stiffness([[d11, d12, 0.0], [d12, d22, 0.0], [0.0, 0.0, d66]]))
+    assert actual == pytest.approx(float(row["D*"]), rel=0.01)
+    assert actual >= float(row["D*"]) * (1.0 - 1e-7)  # an arithmetic-geometric mean's lower bound
 
 
 def with_stiffness(D: Sequence[Sequence[float]]) -> LaminateSection:
@@ -151,11 +151,11 @@ def test_a_contact_without_an_end_in_sight_lasts_for_ever(
 @pytest.mark.parametrize("row", table("large_mass_energy_balance.csv"), ids=lambda row: row["M"])
 def test_a_large_mass_is_stopped_by_bending_and_indentation(row: dict[str, str]) -> None:
     mass, velocity, stiffness, k = (float(row[n]) for n in ("M", "V", "kb", "k contact"))
-    found = static_plate(mass, velocity, k, stiffness)
-    assert found.peak == pytest.approx(float(row["F max (energy balance)"]), rel=1e-7)
+    actual = static_plate(mass, velocity, k, stiffness)
+    assert actual.peak == pytest.approx(float(row["F max (energy balance)"]), rel=1e-7)
     rigid = static_plate(mass, velocity, 1e9 * k, stiffness).duration
     assert rigid == pytest.approx(float(row["duration by SDOF pi sqrt(M/keff)"]), rel=1e-5)
-    assert found.duration > rigid
+    assert actual.duration > rigid
 
 
 def test_the_contact_lasts_as_the_mass_moves_on_plate_and_indentation_in_series() -> None:

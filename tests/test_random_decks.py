@@ -154,8 +154,8 @@ def agree(text: str, mode: str = "report", slips: tuple[str, ...] = ()) -> None:
             for solver in ("csr", "numpy", "kernels")[: 2 + (kernels.LIBRARY is not None)]
         )
     assert_close(array, csr)
-    for found in compiled:
-        assert_close(found, array)
+    for actual in compiled:
+        assert_close(actual, array)
 
 
 def test_the_decks_have_every_word_slip_and_family_of_elements() -> None:

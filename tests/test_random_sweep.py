@@ -88,9 +88,9 @@ def exact_indices() -> Floats:
     return np.array([[float(row[name]) for row in tables()[0]] for name in names])
 
 
-def assert_inside(found: Indices, exact: Floats) -> None:
+def assert_inside(actual: Indices, exact: Floats) -> None:
     """The exact indices lie in the intervals of the estimated ones."""
-    for interval, values in zip((found.first_interval, found.total_interval), exact, strict=True):
+    for interval, values in zip((actual.first_interval, actual.total_interval), exact, strict=True):
         low, high = interval.reshape(-1, 2).T
         assert ((low <= values) & (values <= high)).all()
 
@@ -111,8 +111,8 @@ def ishigami_exact() -> Floats:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("random")
-    (made / "small.inp").write_text(QUICK)
+    built = tmp_path_factory.mktemp("random")
+    (built / "small.inp").write_text(QUICK)
     options = ("--random", "k=uniform:1e6,3e6", "--random", "velocity=normal:115,9")
     done = call(
         "sweep",
@@ -125,10 +125,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "peak_force=600",
         "-o",
         "one.h5",
-        cwd=made,
+        cwd=built,
     )
     assert done.exit_code == 0
-    return made
+    return built
 
 
 def sweep(folder: Path, *options: object) -> Done:
@@ -174,17 +174,17 @@ def test_the_seed_decides_the_design(kind: DesignKind) -> None:
 def test_the_mixed_matrices_are_a_with_one_column_of_b() -> None:
     laws = {name: ValueDistribution("uniform", (0.0, 1.0)) for name in ("k", "q", "velocity")}
     a, b, *mixed = matrix(Design(laws, 16, sensitivity=True)).reshape(5, 16, 3)
-    for column, found in enumerate(mixed):
+    for column, actual in enumerate(mixed):
         kept = [other for other in range(3) if other != column]
-        np.testing.assert_array_equal(found[:, column], b[:, column])
-        np.testing.assert_array_equal(found[:, kept], a[:, kept])
+        np.testing.assert_array_equal(actual[:, column], b[:, column])
+        np.testing.assert_array_equal(actual[:, kept], a[:, kept])
     assert not np.isin(a, b).any()
 
 
 def test_the_indices_of_ishigamis_function_are_the_exact_ones() -> None:
-    found, exact = ishigami("sobol", 4096, 0), ishigami_exact()
-    assert_inside(found, exact)
-    np.testing.assert_allclose([found.first[0], found.total[0]], exact, atol=2e-3)
+    actual, exact = ishigami("sobol", 4096, 0), ishigami_exact()
+    assert_inside(actual, exact)
+    np.testing.assert_allclose([actual.first[0], actual.total[0]], exact, atol=2e-3)
 
 
 @pytest.mark.long
@@ -192,8 +192,10 @@ def test_95_percent_of_the_intervals_cover_the_exact_indices() -> None:
     exact = ishigami_exact()
     covered = []
     for seed in range(200):
-        made = ishigami("mc", 1024, seed)
-        for interval, values in zip((made.first_interval, made.total_interval), exact, strict=True):
+        built = ishigami("mc", 1024, seed)
+        for interval, values in zip(
+            (built.first_interval, built.total_interval), exact, strict=True
+        ):
             covered.append((interval[0, :, 0] <= values) & (values <= interval[0, :, 1]))
     assert np.mean(covered) == pytest.approx(0.95, abs=0.02)
 
@@ -202,10 +204,10 @@ def test_a_constant_quantity_has_no_indices() -> None:
     values = np.random.default_rng(0).normal(size=(3, 3, 64))
     values[1] = 4.2
     values[2, 2, 5] = np.nan
-    found = indices(values, 0)
-    assert np.isfinite(found.total_interval[0]).all()
-    assert all(np.isnan(part[1]).all() for part in found)
-    assert np.isnan(found.total[2]).all()
+    actual = indices(values, 0)
+    assert np.isfinite(actual.total_interval[0]).all()
+    assert all(np.isnan(part[1]).all() for part in actual)
+    assert np.isnan(actual.total[2]).all()
 
 
 def test_resamples_without_variance_and_infinite_values_give_no_interval_and_no_warning() -> None:
@@ -214,10 +216,10 @@ def test_resamples_without_variance_and_infinite_values_give_no_interval_and_no_
     values[1, 0] = np.linspace(0.0, 1.0, 32)
     values[1, 2, 3] = np.inf
     with warnings.catch_warnings(action="error"):
-        found = indices(values, 0)
-    assert np.isfinite(found.total[0]).all()
-    assert np.isnan(found.total_interval[0]).all()
-    assert all(np.isnan(part[1]).all() for part in found)
+        actual = indices(values, 0)
+    assert np.isfinite(actual.total[0]).all()
+    assert np.isnan(actual.total_interval[0]).all()
+    assert all(np.isnan(part[1]).all() for part in actual)
 
 
 def test_the_interval_of_a_probability_is_wilsons() -> None:
@@ -225,8 +227,8 @@ def test_the_interval_of_a_probability_is_wilsons() -> None:
 
     for hits, count in ((0, 16), (3, 40), (4004, 4096), (64, 64)):
         exact = stats.binomtest(hits, count).proportion_ci(method="wilson")
-        found = wilson(np.array(hits), np.array(count))
-        np.testing.assert_allclose(found, [exact.low, exact.high], rtol=1e-9, atol=1e-15)
+        actual = wilson(np.array(hits), np.array(count))
+        np.testing.assert_allclose(actual, [exact.low, exact.high], rtol=1e-9, atol=1e-15)
 
 
 def test_random_masses_hit_as_in_their_own_runs() -> None:
@@ -242,9 +244,9 @@ def test_random_masses_hit_as_in_their_own_runs() -> None:
         np.testing.assert_allclose(force, own, rtol=1e-12)
 
 
-def check_hertz(found: fecm.SweepResult) -> None:
+def check_hertz(swept: fecm.SweepResult) -> None:
     """Compare a sensitivity study of Hertz's impact with the closed forms."""
-    random = found.random
+    random = swept.random
     assert random is not None
     assert_inside(random.sensitivity["peak_force"], exact_indices())
     peak_force = random.statistics["peak_force"]
@@ -357,8 +359,8 @@ def test_the_axes_of_the_file_are_named(folder: Path) -> None:
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")
     group = "sensitivity/peak_force"
-    with xarray.open_dataset(folder / "one.h5", group=group, engine="h5netcdf") as found:
-        assert found.first_interval.dims == ("random_name", "bound")
+    with xarray.open_dataset(folder / "one.h5", group=group, engine="h5netcdf") as actual:
+        assert actual.first_interval.dims == ("random_name", "bound")
 
 
 def test_every_combination_of_varied_values_gets_the_same_draws(folder: Path) -> None:

@@ -74,11 +74,11 @@ def relaxed_energy(plate: PlateModel, field: Floats) -> float:
         total[free] = plate.stiffness @ field[free]
         return total + quadratic, work
 
-    found = field.copy()
+    actual = field.copy()
     in_plane = inner.equations > 0
-    found[in_plane] -= Tangent(replace(plate, mesh=inner)).solve(forces(field)[0][in_plane])
-    total, work = forces(found)
-    return 0.5 * float((found * total).sum() - work)
+    actual[in_plane] -= Tangent(replace(plate, mesh=inner)).solve(forces(field)[0][in_plane])
+    total, work = forces(actual)
+    return 0.5 * float((actual * total).sum() - work)
 
 
 @pytest.mark.parametrize("held", [True, False])
@@ -125,21 +125,21 @@ def test_modes_are_those_of_the_plate_that_the_load_moves_most() -> None:
     oblong = plate.mesh.coordinates * (1.0, 0.73)  # no two modes of equal frequency
     plate = replace(plate, mesh=replace(plate.mesh, coordinates=oblong))
     contact = patch_on(plate, 0.4, 0.38)
-    found = bending_modes(plate, contact, 6)
+    actual = bending_modes(plate, contact, 6)
     every = modes(plate, plate.neq, consistent=False)
     moved = every.shapes @ contact[plate.mesh.equations > 0]
     shares = (moved / every.angular_frequency) ** 2
     largest = np.argsort(-shares)[:6]
-    assert found.stiffness == pytest.approx(every.angular_frequency[largest] ** 2, rel=1e-9)
-    assert found.deflection == pytest.approx(np.abs(moved[largest]), rel=1e-6)
-    assert 1.0 / found.compliance == pytest.approx(static_stiffness(plate, contact), rel=1e-10)
+    assert actual.stiffness == pytest.approx(every.angular_frequency[largest] ** 2, rel=1e-9)
+    assert actual.deflection == pytest.approx(np.abs(moved[largest]), rel=1e-6)
+    assert 1.0 / actual.compliance == pytest.approx(static_stiffness(plate, contact), rel=1e-10)
 
 
 def test_a_central_load_finds_no_mode_that_it_does_not_move() -> None:
     plate = on_square(isotropic_plate(THICKNESS), held=True, n=8)
-    found = bending_modes(plate, patch_on(plate), 14)
-    assert (found.shares > 1e-8 * found.compliance).all()
-    assert (np.diff(np.sort(found.stiffness)) > 1e-6 * found.stiffness.max()).all()
+    actual = bending_modes(plate, patch_on(plate), 14)
+    assert (actual.shares > 1e-8 * actual.compliance).all()
+    assert (np.diff(np.sort(actual.stiffness)) > 1e-6 * actual.stiffness.max()).all()
 
 
 def test_modes_of_equal_frequency_are_the_one_that_moves() -> None:
@@ -274,8 +274,8 @@ def test_no_trial_depends_on_the_other_cases() -> None:
     def force(k: Floats) -> Floats:
         one = np.ones(len(k))
         law = SeriesLaw(HystereticLaw(LinearPermanent(k, 1e9 * one, 0.0 * one, 1.5 * one)), 0.1)
-        found, _ = law.trial(law.start(), ContactPoint(0.0 * one, 0.0 * one), one)
-        return found
+        actual, _ = law.trial(law.start(), ContactPoint(0.0 * one, 0.0 * one), one)
+        return actual
 
     rigidities = np.array([0.1, 2.0, 1e5])
     together = force(rigidities)

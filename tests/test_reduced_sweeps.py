@@ -142,19 +142,19 @@ def test_cases_of_energies_at_which_the_model_does_not_hold_are_run_in_full(
     assert call(*given, "-o", "full.h5", cwd=tmp_path).exit_code == 0
     done = call(*given, "--model", "reduced", "--modes", "2", "-o", "s.h5", cwd=tmp_path)
     assert done.exit_code == 0, done.stderr
-    found, full = (fecm.load_sweep(tmp_path / name) for name in ("s.h5", "full.h5"))
-    assert found.reduced is not None
-    assert found.reduced.in_full == 3
-    np.testing.assert_array_equal(found["peak_force"][4:], full["peak_force"][4:])
-    assert np.all(np.abs(found["peak_force"][:4] / full["peak_force"][:4] - 1.0) < 0.02)
+    actual, full = (fecm.load_sweep(tmp_path / name) for name in ("s.h5", "full.h5"))
+    assert actual.reduced is not None
+    assert actual.reduced.in_full == 3
+    np.testing.assert_array_equal(actual["peak_force"][4:], full["peak_force"][4:])
+    assert np.all(np.abs(actual["peak_force"][:4] / full["peak_force"][:4] - 1.0) < 0.02)
     assert "the 3 cases of the largest energies are run in full" in done.stderr
     assert "with more modes they may be fewer" in done.stderr
     for shown in (done.stdout, call("info", "s.h5", cwd=tmp_path).stdout):
         assert "3 cases of the largest energies: in full, as above 2%" in shown
-    assert found.force is not None
+    assert actual.force is not None
     assert full.force is not None
-    np.testing.assert_array_equal(found.force[5, :STEPS], full.force[5])
-    np.testing.assert_allclose(np.nanmax(found.force, axis=1)[1:], found["peak_force"][1:])
+    np.testing.assert_array_equal(actual.force[5, :STEPS], full.force[5])
+    np.testing.assert_allclose(np.nanmax(actual.force, axis=1)[1:], actual["peak_force"][1:])
 
 
 @pytest.mark.parametrize("held", [*range(9), 29, 30])
@@ -218,8 +218,8 @@ def test_an_elastic_rod_hits_the_reduced_plate_as_the_full_one() -> None:
 def test_cases_of_many_velocities_are_few_tasks() -> None:
     (problem,) = load_deck(DECK).problems
     cases: list[Any] = [{"velocity": float(v)} for v in range(1, 301)]
-    made = tasks(plan(problem, cases, modes=5))
-    assert [len(task.numbers) for task in made] == [256, 44]
+    built = tasks(plan(problem, cases, modes=5))
+    assert [len(task.numbers) for task in built] == [256, 44]
 
 
 def test_a_rod_takes_a_step_in_which_a_wave_crosses_one_element_at_most() -> None:
@@ -238,14 +238,14 @@ def test_the_compliance_left_out_is_in_series_with_the_contact() -> None:
     plate = ReducedPlate(1, np.array([1e16]), np.array([1e-3]), c, cubic=none, quartic=none)
     law = LinearPermanent(*(np.full(2, x) for x in (k, 1e9, 0.0, 1.5)))
     hits = Hits([RigidMass(mass)], np.zeros(2, np.intp), np.ones(2), HystereticLaw(law), speeds)
-    found = ReducedImpacts(plate, 5e-7, 2000).impacts(hits)
-    peak = found.force.max(axis=0)
-    assert found.force[-1].max() == 0.0
-    assert found.error.max() < 1e-4
+    actual = ReducedImpacts(plate, 5e-7, 2000).impacts(hits)
+    peak = actual.force.max(axis=0)
+    assert actual.force[-1].max() == 0.0
+    assert actual.error.max() < 1e-4
     stored = 0.4 * peak ** (5.0 / 3.0) / k ** (2.0 / 3.0) + 0.5 * c * peak**2
     np.testing.assert_allclose(stored, 0.5 * mass * speeds**2, rtol=1e-4)
-    np.testing.assert_allclose(found.plate.largest, c * peak, rtol=1e-6)
-    np.testing.assert_allclose(found.indentation.largest, (peak / k) ** (2.0 / 3.0), rtol=1e-4)
+    np.testing.assert_allclose(actual.plate.largest, c * peak, rtol=1e-6)
+    np.testing.assert_allclose(actual.indentation.largest, (peak / k) ** (2.0 / 3.0), rtol=1e-4)
 
 
 def test_a_stiff_contact_halves_the_time_step_of_its_cases() -> None:

@@ -34,12 +34,12 @@ DECKS = {"appendix": (APPENDIX, slice(None)), "long": (LONG, slice(9, None, 10))
 @pytest.fixture(scope="module")
 def results() -> dict[tuple[str, str], Result]:
     """Both decks in both modes."""
-    made: dict[tuple[str, str], Result] = {}
+    built: dict[tuple[str, str], Result] = {}
     for name, (deck, _) in DECKS.items():
         for mode in ("report", "listing"):
             result = fecm.run_one(deck, mode=mode)
-            made[name, mode] = result
-    return made
+            built[name, mode] = result
+    return built
 
 
 def reference(name: str) -> dict[str, Floats]:
@@ -198,9 +198,9 @@ def test_the_listing_stores_contact_at_every_step_and_strains_one_step_old(
 
 @pytest.mark.parametrize("solver", ["csr", "auto"])
 def test_both_products_give_the_same_history(solver: str) -> None:
-    made = impact_of(APPENDIX)
-    motion = PlateMotion(made.motion.plate, solver)
-    impact = ImpactSystem(motion, made.rod, made.law, made.contact)
+    built = impact_of(APPENDIX)
+    motion = PlateMotion(built.motion.plate, solver)
+    impact = ImpactSystem(motion, built.rod, built.law, built.contact)
     state = impact.start()
     for _ in range(10):
         impact.advance(state, 2e-7)

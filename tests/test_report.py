@@ -117,13 +117,13 @@ def test_a_criterion_that_reaches_1_below_the_threshold_is_named_beside_it(faile
 
 @pytest.mark.usefixtures("_undrawn")
 def test_verdict_and_table_of_a_page_name_one_ply_for_the_first_failure(failed: Result) -> None:
-    made = page_of({"failed": failed})
-    (results,) = (section for section in made.sections if section.title == "Results")
+    built = page_of({"failed": failed})
+    (results,) = (section for section in built.sections if section.title == "Results")
     tables = {table.title: table for table in results.blocks if isinstance(table, Table)}
     earliest, *_ = tables["First failure by criterion"].rows
     criterion, mode, where = map(str, earliest[:3])
-    assert "first failure: " in made.verdict[0]
-    assert f"{mode} ({criterion}), {where}, at" in made.verdict[0]
+    assert "first failure: " in built.verdict[0]
+    assert f"{mode} ({criterion}), {where}, at" in built.verdict[0]
     assert "1 at time" not in tables["Largest exposures"].header
 
 
@@ -390,15 +390,15 @@ def test_a_fit_has_a_page(tmp_path: Path) -> None:
         "--report", output, cwd=tmp_path,
     )  # fmt: skip
     assert done.exit_code == 0, done.stderr
-    found = read_page(output.read_text("utf-8"))
-    k = found.row("k")
+    actual = read_page(output.read_text("utf-8"))
+    k = actual.row("k")
     said = re.search(r"^k +(\S+) lbf/in\^1.5 +(\S+) lbf/in\^1.5 ", done.stdout, re.MULTILINE)
     assert said is not None
     assert [float(f"{k[0].value:.5g}"), float(f"{k[1].value:.2g}")] == [
         float(text) for text in said.groups()
     ]
-    assert "1 % more" in " ".join(found.captions)
-    assert all(agrees(cell) for cell in found.numbers())
+    assert "1 % more" in " ".join(actual.captions)
+    assert all(agrees(cell) for cell in actual.numbers())
 
 
 @pytest.mark.usefixtures("_undrawn")

@@ -47,12 +47,12 @@ def rod(density: float = STEEL, elements: int = 20) -> Rod:
 def waves(pulse: Pulse, time: Floats, x: float, density: float = STEEL) -> Floats:
     """Force at x in the rod by d'Alembert: both ends turn compression into tension."""
     through = np.sqrt(density / 30e6)
-    found = np.zeros_like(time)
+    actual = np.zeros_like(time)
     for turn in range(int(time[-1] / through / 2) + 2):
         for sign, path in ((1.0, 2 * turn + x), (-1.0, 2 * turn + 2 - x)):
             late = time - path * through
-            found += sign * np.where(late >= 0.0, pulse.force(late), 0.0)
-    return found
+            actual += sign * np.where(late >= 0.0, pulse.force(late), 0.0)
+    return actual
 
 
 # Mechanics ---------------------------------------------------------------------------------------
@@ -180,8 +180,8 @@ def test_the_command_prints_what_the_rod_does() -> None:
     done = call("rod", *SHAPE, *PUSH, "--station", 0.5, "--station", 0.25)
     assert done.exit_code == 0
     assert done.stderr == ""
-    found, expected = columns(done.stdout), simulate_pulse(rod(), GAUSS, 2e-7, 600e-6, (0.5, 0.25))
-    assert list(found) == [
+    actual, expected = columns(done.stdout), simulate_pulse(rod(), GAUSS, 2e-7, 600e-6, (0.5, 0.25))
+    assert list(actual) == [
         "time",
         "force",
         "force_at_0.5",
@@ -192,9 +192,9 @@ def test_the_command_prints_what_the_rod_does() -> None:
         "acceleration_middle",
         "acceleration_far_end",
     ]
-    np.testing.assert_array_equal(found["force_at_0.25"], expected.forces[:, 1])
-    np.testing.assert_array_equal(found["acceleration_far_end"], expected.accelerations[:, 2])
-    np.testing.assert_array_equal(found["ratio_at_0.5"], expected.forces[:, 0] / found["force"])
+    np.testing.assert_array_equal(actual["force_at_0.25"], expected.forces[:, 1])
+    np.testing.assert_array_equal(actual["acceleration_far_end"], expected.accelerations[:, 2])
+    np.testing.assert_array_equal(actual["ratio_at_0.5"], expected.forces[:, 0] / actual["force"])
     assert call("rod", "pulse", *SHAPE, *PUSH).stdout.startswith("time,force,force_at_0.5,ratio")
     named = call("rod", "pulse", *SHAPE, *PUSH, "--units", "in-lbf-s").stdout.splitlines()[0]
     assert named == (
@@ -220,9 +220,12 @@ def test_a_deck_gives_its_rod_and_its_time_step(tmp_path: Path) -> None:
     deck = tmp_path / "small.inp"
     deck.write_text(small())
     done = call("rod", deck, "--pulse", "sine:1000,400e-6")
-    found, expected = columns(done.stdout), simulate_pulse(report_rod(), SINE, 5e-7, 600e-6, (0.5,))
-    np.testing.assert_array_equal(found["time"], expected.time)
-    np.testing.assert_array_equal(found["force_at_0.5"], expected.forces[:, 0])
+    actual, expected = (
+        columns(done.stdout),
+        simulate_pulse(report_rod(), SINE, 5e-7, 600e-6, (0.5,)),
+    )
+    np.testing.assert_array_equal(actual["time"], expected.time)
+    np.testing.assert_array_equal(actual["force_at_0.5"], expected.forces[:, 0])
     twice = call("rod", deck, "--pulse", "sine:1000,400e-6", "--length", 2)
     assert twice.exit_code == 2
     assert "--length is for a rod without a deck" in twice.stderr

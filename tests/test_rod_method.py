@@ -168,13 +168,13 @@ def result(**options: Any) -> Result:
 
 @pytest.mark.parametrize(("mass", "integrator"), BOTH)
 def test_every_choice_meets_the_law_and_keeps_the_energy(mass: str, integrator: str) -> None:
-    found = result(rod_mass=mass, rod_integrator=integrator)
+    actual = result(rod_mass=mass, rod_integrator=integrator)
     # Were the iteration's weights not the step's own, force and accepted indentation would differ.
-    assert found.force == pytest.approx(1912000.0 * found.indentation**1.5, rel=2e-6)
-    assert found.history.attributes["unsettled_steps"] == 0
-    initial = found.energy.attributes["initial"]
+    assert actual.force == pytest.approx(1912000.0 * actual.indentation**1.5, rel=2e-6)
+    assert actual.history.attributes["unsettled_steps"] == 0
+    initial = actual.energy.attributes["initial"]
     assert initial == pytest.approx(0.5 * 1.8096e-4 * 115.0**2, rel=1e-4)
-    assert np.abs(found.energy.balance_error).max() < 1e-4 * initial
+    assert np.abs(actual.energy.balance_error).max() < 1e-4 * initial
 
 
 def test_a_result_tells_its_choices_and_nothing_of_the_default() -> None:

@@ -160,8 +160,8 @@ def pad(*cards: str) -> Deck:
     """The small plate, of one ply, with another laminate on an element."""
     head = DATA_CARDS[: DATA_CARDS.index("    2  90.")].replace(".106", ".053")
     lams = "LAMS\n    2    1\n    1   0.     0.070\n\nZONE\n    2              2\n\n"
-    made = small(data="".join(cards) + lams + head)
-    return lambda: made.replace("    4    2    2    5", "    4    1    2    5")
+    built = small(data="".join(cards) + lams + head)
+    return lambda: built.replace("    4    2    2    5", "    4    1    2    5")
 
 
 CLAMPED = "11111"

@@ -29,8 +29,8 @@ def _imports(script: Path) -> Iterator[str]:
     """Names of the packages that a script imports."""
     for node in ast.walk(ast.parse(script.read_text())):
         match node:
-            case ast.Import(names=found):
-                yield from (alias.name.partition(".")[0] for alias in found)
+            case ast.Import(names=imported):
+                yield from (alias.name.partition(".")[0] for alias in imported)
             case ast.ImportFrom(module=str(module)):
                 yield module.partition(".")[0]
 

@@ -170,8 +170,8 @@ def laminate_of(name: str) -> LaminateSection:
 
 @pytest.mark.parametrize("name", PLATES)
 def test_the_shear_stiffness_of_several_materials_is_that_of_equal_energy(name: str) -> None:
-    made = laminate_of(name)
-    shears = {"FSDT K=1": made.shear, "FSDT EQUI": equilibrium_shear_stiffness(made)}
+    built = laminate_of(name)
+    shears = {"FSDT K=1": built.shear, "FSDT EQUI": equilibrium_shear_stiffness(built)}
     for theory, shear in shears.items():
         row = rows_of(name, theory)[0]
         expected = [float(row[f"shear stiffness {axis}"]) for axis in ("xz", "yz")]
@@ -325,7 +325,7 @@ SOLVERS = [
 
 
 def assert_same(
-    found: Result, wanted: Result, tolerance: float, less: Collection[str] = ()
+    result: Result, wanted: Result, tolerance: float, less: Collection[str] = ()
 ) -> None:
     """Datasets agree, relative to the largest of their values."""
     for path in wanted:
@@ -336,7 +336,7 @@ def assert_same(
         if path == "energy/balance_error":
             scale = wanted.attributes_of("energy")["initial"]
         np.testing.assert_allclose(
-            found[path], values, rtol=0.0, atol=tolerance * scale, err_msg=path
+            result[path], values, rtol=0.0, atol=tolerance * scale, err_msg=path
         )
 
 
@@ -397,7 +397,7 @@ def test_stresses_and_exposures_are_those_of_each_elements_own_laminate() -> Non
     ]
     of_plies[1][1] = None
     several = PlyStresses(problem.mesh, plate.rows_by_laminate, rule)
-    found = several.evaluate(field)
+    actual = several.evaluate(field)
     kinds = [FailureMonitor, *([CompiledMonitor] if LIBRARY is not None else [])]
     for kind in kinds:
         monitor = kind(several, of_plies)
@@ -409,7 +409,7 @@ def test_stresses_and_exposures_are_those_of_each_elements_own_laminate() -> Non
             alone = PlyStresses(problem.mesh, zone, rule, rows)
             count = len(own)
             for name, values in alone.evaluate(field).items():
-                plies = found[name][rows]
+                plies = actual[name][rows]
                 if name != "residual":
                     axis = 2 if values.ndim == 4 else 1
                     assert np.isnan(np.delete(plies, np.s_[:count], axis)).all()
@@ -449,12 +449,14 @@ def test_an_interface_of_unlike_materials_takes_the_weaker_strength() -> None:
 
 
 def test_plies_have_the_z_and_strains_of_each_elements_own_laminate() -> None:
-    found = fecm.run_one(unlike()).plies()
-    assert found.z.shape == (16, 3, 3)
-    np.testing.assert_allclose(found.z[8, :, 1], [-0.375, 0.0, 0.375])
-    assert np.isnan(found.z[2, 2]).all()
-    assert found.angles[2, :2].tolist() == [45.0, -45.0]
-    one, two, eps = (values[-1, 8, :, 0] for values in (found.sigma_1, found.sigma_2, found.eps_1))
+    actual = fecm.run_one(unlike()).plies()
+    assert actual.z.shape == (16, 3, 3)
+    np.testing.assert_allclose(actual.z[8, :, 1], [-0.375, 0.0, 0.375])
+    assert np.isnan(actual.z[2, 2]).all()
+    assert actual.angles[2, :2].tolist() == [45.0, -45.0]
+    one, two, eps = (
+        values[-1, 8, :, 0] for values in (actual.sigma_1, actual.sigma_2, actual.eps_1)
+    )
     ply = HYBRID[0]  # material 2
     np.testing.assert_allclose(eps, (one - ply.nu12 * two) / ply.e1, rtol=1e-12)
 
@@ -485,9 +487,9 @@ def test_half_of_the_plate_is_computed_only_where_zones_are_symmetric(
 @compiled
 def test_kernels_and_numpy_agree_on_a_nonlinear_plate_of_several_laminates() -> None:
     deck = unlike(model.Nonlinear(), words="DISP=10", steps=200)
-    found, wanted = (fecm.run_one(deck, solver=s) for s in ("kernels", "numpy"))
+    actual, wanted = (fecm.run_one(deck, solver=s) for s in ("kernels", "numpy"))
     assert np.abs(wanted["membrane/largest_force"]).max() > 1.0
-    assert_same(found, wanted, 1e-10)
+    assert_same(actual, wanted, 1e-10)
 
 
 def test_the_load_is_on_the_laminate_under_it() -> None:
@@ -556,11 +558,11 @@ def test_cure_takes_the_expansion_of_each_layers_material() -> None:
     (problem,) = load_deck(unlike(model.Cure(-100.0, expansions=expansions))).problems
     assert problem.residuals is not None
     layups = problem.deck.layers.values()
-    for found, own, layers in zip(problem.residuals, problem.plate.laminates, layups, strict=True):
+    for actual, own, layers in zip(problem.residuals, problem.plate.laminates, layups, strict=True):
         number = np.array([layer.material for layer in layers])
         expected = residual_stresses(own, -1e-4 * number, -2e-3 * number)
         atol = 1e-12 * np.abs(expected.stresses).max()
-        np.testing.assert_allclose(found.stresses, expected.stresses, rtol=1e-12, atol=atol)
+        np.testing.assert_allclose(actual.stresses, expected.stresses, rtol=1e-12, atol=atol)
 
 
 def test_an_interface_of_unlike_materials_can_delaminate() -> None:

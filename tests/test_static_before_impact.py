@@ -89,8 +89,8 @@ def test_the_contact_of_a_plate_in_equilibrium_is_that_of_the_unloaded_plate(nam
     loaded = run(deck(text, STATIC + STEPS, supports=supports))
     unloaded = run(deck(data, supports=supports))
     for column in TAPE9:
-        found, expected = loaded[f"history/{column}"], unloaded[f"history/{column}"]
-        assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max(), column
+        actual, expected = loaded[f"history/{column}"], unloaded[f"history/{column}"]
+        assert np.abs(actual - expected).max() < 1e-9 * np.abs(expected).max(), column
     start = loaded.history.attributes["start_w"]
     assert abs(start) > 1e-3 * unloaded.plate_w.max()
     np.testing.assert_allclose(loaded.plate_w - start, unloaded.plate_w, atol=1e-12)

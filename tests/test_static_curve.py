@@ -60,9 +60,9 @@ def test_force_and_work_of_a_disc_are_those_of_the_axisymmetric_solution(
     )
     curve = curve_of(disc(100.0, 5, isotropic(), edge), shape, 10.0, deflection.max())
     assert len(rows) == 4
-    found = curve.at(deflection)
-    np.testing.assert_allclose(found[0], force, rtol=3e-3)
-    np.testing.assert_allclose(found[1], energy, rtol=3e-3)
+    actual = curve.at(deflection)
+    np.testing.assert_allclose(actual[0], force, rtol=3e-3)
+    np.testing.assert_allclose(actual[1], energy, rtol=3e-3)
 
 
 @pytest.mark.parametrize(
@@ -85,9 +85,9 @@ def test_force_and_work_of_a_rectangle_are_those_of_the_spectral_solution(case: 
     plate = rectangle(100.0, 100.0, 8, LAMINATES[kind], "_".join(case.split("_")[-2:]))
     curve = curve_of(plate, "HERT", 10.0, deflection.max())
     assert len(rows) >= 3
-    found = curve.at(deflection)
-    np.testing.assert_allclose(found[0], force, rtol=1e-3)
-    np.testing.assert_allclose(found[1], energy, rtol=1e-3)
+    actual = curve.at(deflection)
+    np.testing.assert_allclose(actual[0], force, rtol=1e-3)
+    np.testing.assert_allclose(actual[1], energy, rtol=1e-3)
 
 
 def test_steps_twice_as_long_give_the_same_curve() -> None:
@@ -128,9 +128,9 @@ def test_the_balance_of_energy_gives_the_peaks_of_the_exact_static_curve(edge: s
     assert len(rows) == 5
     low = []
     for row in rows:
-        found = curved_plate(MASS, float(row["velocity_mm_per_s"]), K, curve)
-        assert found.peak == pytest.approx(float(row["quasi_static_exact_peak_N"]), rel=2e-3)
-        low.append(1.0 - found.peak / float(row["peak_N"]))
+        actual = curved_plate(MASS, float(row["velocity_mm_per_s"]), K, curve)
+        assert actual.peak == pytest.approx(float(row["quasi_static_exact_peak_N"]), rel=2e-3)
+        low.append(1.0 - actual.peak / float(row["peak_N"]))
     assert 0.085 < min(low) < max(low) < 0.265  # of the run: 9 to 26 %
 
 

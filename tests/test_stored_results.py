@@ -71,12 +71,12 @@ def stored(deck: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("name", DECKS)
 def test_a_deck_keeps_its_datasets(name: str) -> None:
-    expected, found = json.loads(FILE.read_text(encoding="utf-8"))[name], stored(DECKS[name])
-    assert {path: row[:2] for path, row in found.items()} == {
+    expected, actual = json.loads(FILE.read_text(encoding="utf-8"))[name], stored(DECKS[name])
+    assert {path: row[:2] for path, row in actual.items()} == {
         path: row[:2] for path, row in expected.items()
     }
     for path, (kind, _, wanted) in expected.items():
-        got = found[path][2]
+        got = actual[path][2]
         if not kind.startswith("float"):
             assert got == wanted, path
             continue

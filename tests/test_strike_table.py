@@ -40,10 +40,10 @@ def sweep(text: str, vary: dict[str, list[float]]) -> fecm.SweepResult:
     return fecm.sweep(model(text), vary)
 
 
-def assert_same(found: fecm.SweepResult, wanted: fecm.SweepResult) -> None:
-    assert found.keys() == wanted.keys()
+def assert_same(swept: fecm.SweepResult, wanted: fecm.SweepResult) -> None:
+    assert swept.keys() == wanted.keys()
     for name in wanted:
-        np.testing.assert_array_equal(found[name], wanted[name], err_msg=name)
+        np.testing.assert_array_equal(swept[name], wanted[name], err_msg=name)
 
 
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
@@ -62,16 +62,16 @@ def test_a_sweep_is_that_of_strikes_made_one_by_one(
 
 
 def test_valid_cases_of_a_plate_need_no_cards(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[Case] = []
+    built: list[Case] = []
 
     def counted(plate: Deck, case: Case) -> Strike:
-        made.append(case)
+        built.append(case)
         return strike_of_case(plate, case)
 
     monkeypatch.setattr(impact_columns, "strike_of_case", counted)
     vary = {"velocity": np.linspace(60.0, 115.0, 8).tolist(), "k": np.linspace(1e6, 2e6, 8)}
     assert sweep(ROD, {**vary, "k": vary["k"].tolist()}).completed.all()
-    assert len(made) <= 6  # of 64: those that are checked, and one asked for a law of the user's
+    assert len(built) <= 6  # of 64: those that are checked, and one asked for a law of the user's
 
 
 @pytest.mark.parametrize("text", [ROD, RIGID])

@@ -28,9 +28,9 @@ MODULES = (
 
 @pytest.mark.parametrize("name", MODULES)
 def test_the_examples_of_a_module_print_what_they_say(name: str) -> None:
-    found = doctest.testmod(import_module(name))
-    assert found.attempted > 0
-    assert found.failed == 0
+    actual = doctest.testmod(import_module(name))
+    assert actual.attempted > 0
+    assert actual.failed == 0
 
 
 # Estimates ----------------------------------------------------------------------------------------
@@ -40,17 +40,17 @@ def test_an_estimate_is_what_the_command_prints(tmp_path: Path) -> None:
     path = tmp_path / "d.inp"
     path.write_text(deck("DELA\n.5,\n", mesh=HELD))
     with pytest.warns(fecm.FecmWarning) as caught:
-        found = fecm.estimate(path)
+        actual = fecm.estimate(path)
     texts = [str(one.message) for one in caught]
-    assert found.notes
-    assert set(found.notes) <= set(texts)
+    assert actual.notes
+    assert set(actual.notes) <= set(texts)
     assert {one.filename for one in caught} == {__file__}
     shown = call("estimate", path)
-    assert shown.stdout == f"{found}\n"
-    assert all(f"note: {text}" in shown.stderr for text in found.notes)
+    assert shown.stdout == f"{actual}\n"
+    assert all(f"note: {text}" in shown.stderr for text in actual.notes)
     listed = json.loads(call("estimate", path, "--format", "json").stdout)
     for row in listed["models"]:
-        assert row["energy"] == found.models[row["model"]].energy
+        assert row["energy"] == actual.models[row["model"]].energy
 
 
 def test_an_estimate_of_a_deck_with_errors_or_several_problems_is_refused() -> None:
@@ -106,9 +106,9 @@ def test_waves_of_plies_of_two_densities_do_not_depend_on_the_side_of_the_heavy_
             [[mass, first], [first, second]], np.diag([2.0 * plane, 8.0 / 12.0 * plane])
         )
     )
-    found = waves.fronts([0.0]).velocity[0]
+    actual = waves.fronts([0.0]).velocity[0]
     for speed in np.sqrt(fast.real):
-        assert np.abs(found / speed - 1.0).min() < 1e-9
+        assert np.abs(actual / speed - 1.0).min() < 1e-9
 
 
 def test_a_laminate_that_makes_no_waves_is_refused_in_the_words_of_the_call() -> None:
@@ -133,20 +133,20 @@ def test_a_fit_is_what_the_command_prints_of_a_file_or_of_arrays(tmp_path: Path)
     path = fecm.examples.path("indentation-test")
     units = ("in", "lbf")
     with pytest.warns(fecm.FecmWarning, match="alpha_m of cycle 1 is the recorded value"):
-        found = fecm.fit_indentation(path, units=units)
-    assert call("indent", "fit", path, "--unit", "in,lbf").stdout == f"{found}\n"
+        actual = fecm.fit_indentation(path, units=units)
+    assert call("indent", "fit", path, "--unit", "in,lbf").stdout == f"{actual}\n"
     listed = json.loads(call("indent", "fit", path, "--format", "json").stdout)
-    assert listed["k"] == {"value": found.k.value, "error": found.k.error}
+    assert listed["k"] == {"value": actual.k.value, "error": actual.k.error}
     columns = np.loadtxt(path, delimiter=",", skiprows=3, unpack=True)
     same = fecm.fit_indentation((columns[0], columns[1]), units=units)
-    assert str(same) == str(found)
+    assert str(same) == str(actual)
     # The report's constants of the 0.5 in indenter, of which the example is made.
-    assert found.k.value == pytest.approx(1.330e6, abs=3.0 * found.k.error)
-    assert found.law is not None
+    assert actual.k.value == pytest.approx(1.330e6, abs=3.0 * actual.k.error)
+    assert actual.law is not None
     deck = fecm.impact(
         fecm.Plate.rectangle((4, 3), (4, 4), support="simple"),
         fecm.Laminate("[0/90]s", "report", 0.02),
-        contact=found.law,
+        contact=actual.law,
         velocity=100.0,
         duration=1e-5,
     )
@@ -179,20 +179,20 @@ def test_what_is_no_indentation_test_is_refused(options: dict[str, Any], words: 
 
 def test_a_pulse_test_of_a_deck_is_that_of_the_command(tmp_path: Path) -> None:
     pulse, table = "gauss:1000,200e-6,40e-6", tmp_path / "p.csv"
-    found = fecm.pulse_test(LONG, pulse, duration=3e-4, filter="first-order:10e-6")
+    actual = fecm.pulse_test(LONG, pulse, duration=3e-4, filter="first-order:10e-6")
     options = ("--duration", "3e-4", "--filter", "first-order:10e-6", "-o", table)
-    assert call("rod", LONG, "--pulse", pulse, *options).stdout == f"{found}\n"
+    assert call("rod", LONG, "--pulse", pulse, *options).stdout == f"{actual}\n"
     columns = np.loadtxt(table, delimiter=",", skiprows=1, unpack=True)
-    np.testing.assert_array_equal(columns[2], found.forces[:, 0])
-    assert found.filtered is not None
-    np.testing.assert_array_equal(columns[3], found.filtered[:, 0])
-    assert found.units == {}  # the deck names none
+    np.testing.assert_array_equal(columns[2], actual.forces[:, 0])
+    assert actual.filtered is not None
+    np.testing.assert_array_equal(columns[3], actual.filtered[:, 0])
+    assert actual.units == {}  # the deck names none
 
 
 def test_a_pulse_of_arrays_is_linear_between_its_points() -> None:
     rod = fecm.Rod.cylinder(1.0, 0.625, 30e6, 7.33e-4)
-    found = fecm.pulse_test(rod, ([0.0, 1e-4], [0.0, 500.0]), dt=1e-6)
-    np.testing.assert_allclose(found.applied, 5e6 * found.time, atol=1e-9)
+    actual = fecm.pulse_test(rod, ([0.0, 1e-4], [0.0, 500.0]), dt=1e-6)
+    np.testing.assert_allclose(actual.applied, 5e6 * actual.time, atol=1e-9)
 
 
 @pytest.mark.parametrize(

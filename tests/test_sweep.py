@@ -85,12 +85,12 @@ def test_a_plates_displacement_is_the_sum_of_its_impulse_responses() -> None:
     sums = np.convolve(response, force)[:steps]
     np.testing.assert_allclose(sums, direct, atol=1e-12 * np.abs(direct).max())
     blocks = Convolution(response, np.zeros(1, dtype=np.intp))
-    found = np.empty(steps)
+    actual = np.empty(steps)
     blocks.give(np.array([force[0]]))  # f_0 pushes in the first step
     for step in range(steps):
-        found[step] = blocks.next()[0, 0]
+        actual[step] = blocks.next()[0, 0]
         blocks.give(np.array([force[step + 1] if step + 1 < steps else 0.0]))
-    np.testing.assert_allclose(found, direct, atol=1e-12 * np.abs(direct).max())
+    np.testing.assert_allclose(actual, direct, atol=1e-12 * np.abs(direct).max())
 
 
 def test_no_case_depends_on_the_others_of_its_plate() -> None:
@@ -334,8 +334,8 @@ def test_two_workers_give_what_one_process_does() -> None:
 
 def children() -> list[int]:
     """Processes that this one has started."""
-    found = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
-    return [int(pid) for pid in found]
+    actual = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+    return [int(pid) for pid in actual]
 
 
 @pytest.mark.long
@@ -461,10 +461,10 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
         if len(finished) == 5:
             workers[0].kill()
 
-    found = carry_out_plan(problem, planned, Means(scheduler=address), done=kill)
+    actual = carry_out_plan(problem, planned, Means(scheduler=address), done=kill)
     assert workers[0].poll() is not None or workers[0].wait(10) is not None
     assert sorted(finished) == list(range(16))
-    assert_same(found, serial())
+    assert_same(actual, serial())
 
 
 def test_a_scheduler_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -510,10 +510,10 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     # A part that is not whole is run again.
     (again.folder / "task-000002.npz").write_bytes(b"PK\x03\x04 and no more")
     watch = Notes()
-    found = carry_out_plan(problem, planned, parts=again, watch=watch, keeps_forces=False)
+    actual = carry_out_plan(problem, planned, parts=again, watch=watch, keeps_forces=False)
     forces = [force for _, force in again.forces() if force is not None]
     at_once = fecm.sweep(deck, {"layup": layups}, history=True)
-    assert_same(replace(found, force=np.vstack(forces)), at_once)
+    assert_same(replace(actual, force=np.vstack(forces)), at_once)
     assert len(watch.notes) == 1
     assert "task-000002.npz is damaged; its cases are run again" in watch.notes[0]
     with pytest.raises(OtherSweepError):

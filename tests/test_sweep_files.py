@@ -143,10 +143,10 @@ def test_another_number_or_text_of_a_case_is_a_difference(
 def test_texts_differ_at_any_tolerance(swept: Path, changed: Callable[[str, object], Path]) -> None:
     other = changed("summary/status", b"lost")
     assert call("diff", swept, other, "--rtol", 1e9, "--atol", 1e9).exit_code == 1
-    (told,) = json.loads(call("diff", swept, other, "--format", "json", "--brief").stdout)[
+    (text,) = json.loads(call("diff", swept, other, "--format", "json", "--brief").stdout)[
         "datasets"
     ]
-    assert (told["a"], told["b"], told["at"]["case"]) == ("ok", "lost", 4)
+    assert (text["a"], text["b"], text["at"]["case"]) == ("ok", "lost", 4)
 
 
 def test_numbers_in_the_place_of_texts_are_a_difference(swept: Path, tmp_path: Path) -> None:

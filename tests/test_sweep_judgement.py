@@ -65,9 +65,9 @@ def test_cases_together_keep_the_energy_as_well_as_their_runs_do(
     seen: list[float] = []
 
     def watched(*arguments: Any) -> ComputedImpacts:
-        made = impacts(*arguments)
-        seen.extend(made.error.tolist())
-        return made
+        built = impacts(*arguments)
+        seen.extend(built.error.tolist())
+        return built
 
     monkeypatch.setattr(backends, "impacts", watched)
     deck = fecm.read_one(small(STEPS))
@@ -84,10 +84,10 @@ def test_a_force_with_no_projectile_behind_it_is_an_error_of_the_balance() -> No
     kind = np.zeros(1, dtype=np.intp)
     law = HystereticLaw(stack_parameters([LinearPermanent(1.9e6, 1.0, 0.0, 2.0)]))
     tips = TipSteps(Hits([mass], kind, np.ones(1), law, np.array([100.0])), dt, steps)
-    found, work = by_numpy(np.zeros(steps), 1e-6, tips)
-    assert found.error[0] < 1e-4
+    actual, work = by_numpy(np.zeros(steps), 1e-6, tips)
+    assert actual.error[0] < 1e-4
     work.done[-1] += 0.05 * 0.5 * 1.8e-4 * 100.0**2
-    (error,) = balance_errors(found.force, work, tips)
+    (error,) = balance_errors(actual.force, work, tips)
     assert error == pytest.approx(0.05, abs=1e-4)
 
 
@@ -130,12 +130,12 @@ def test_the_last_line_counts_and_failed_cases_end_in_1(tmp_path: Path) -> None:
         return done.exit_code, done.stdout.splitlines()[-1]
 
     assert last("--vary", "velocity=100,150") == (0, "2 cases: all ok")
-    told = "1 case: 1 still in contact at the end"
-    assert last("--vary", "velocity=50") == (0, told)
+    text = "1 case: 1 still in contact at the end"
+    assert last("--vary", "velocity=50") == (0, text)
     both = ("--vary", "velocity=50,150", "--vary", "k=-1,2e6")
-    told = "4 cases: 1 still in contact at the end, 2 failed"
-    assert last(*both) == (1, told)
-    assert last(*both, "--allow-failed") == (0, told)
+    text = "4 cases: 1 still in contact at the end, 2 failed"
+    assert last(*both) == (1, text)
+    assert last(*both, "--allow-failed") == (0, text)
 
 
 def test_texts_that_spreadsheets_compute_are_exported_as_texts(tmp_path: Path) -> None:

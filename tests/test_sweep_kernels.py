@@ -70,19 +70,19 @@ def test_cases_are_those_of_numpy(
     def swept() -> SweepResult:
         return fecm.sweep(deck, cases=cases, history=True, measure=measured)
 
-    found = swept()
+    actual = swept()
     without_kernels(monkeypatch)
     wanted = swept()
-    assert found.force is not None
+    assert actual.force is not None
     assert wanted.force is not None
-    assert found["status"].tolist() == wanted["status"].tolist()
+    assert actual["status"].tolist() == wanted["status"].tolist()
     peaks = wanted.force.max(axis=1, keepdims=True)
     assert (peaks > 1.0).all()
-    assert (np.abs(found.force - wanted.force) <= 1e-10 * peaks).all()
+    assert (np.abs(actual.force - wanted.force) <= 1e-10 * peaks).all()
     for name, values in wanted.summary.items():
         if values.dtype.kind == "f":
             atol = 1e-10 * np.nanmax(np.abs(values), initial=0.0)
-            np.testing.assert_allclose(found[name], values, rtol=0.0, atol=atol, err_msg=name)
+            np.testing.assert_allclose(actual[name], values, rtol=0.0, atol=atol, err_msg=name)
 
 
 @compiled
@@ -111,17 +111,17 @@ def test_errors_of_the_energy_balance_are_those_of_numpy(monkeypatch: pytest.Mon
     fecm.sweep(deck, cases=cases)
     without_kernels(monkeypatch)
     fecm.sweep(deck, cases=cases)
-    found, wanted = seen
+    actual, wanted = seen
     assert wanted.error[2] > 0.01
-    np.testing.assert_array_equal(found.unconverged_steps, wanted.unconverged_steps)
+    np.testing.assert_array_equal(actual.unconverged_steps, wanted.unconverged_steps)
     finite = np.isfinite(wanted.error)
     assert finite.tolist() == [True, True, True, False]
-    np.testing.assert_allclose(found.error[finite], wanted.error[finite], rtol=1e-6, atol=1e-9)
-    assert not found.error[3] < 1.0
+    np.testing.assert_allclose(actual.error[finite], wanted.error[finite], rtol=1e-6, atol=1e-9)
+    assert not actual.error[3] < 1.0
     for name, values in wanted.plate._asdict().items():
         computed, expected = (
             np.broadcast_to(column, finite.shape)[finite]
-            for column in (getattr(found.plate, name), values)
+            for column in (getattr(actual.plate, name), values)
         )
         np.testing.assert_allclose(computed, expected, rtol=1e-9, err_msg=name)
 
@@ -136,28 +136,28 @@ def test_a_plate_that_nothing_holds_bends_as_its_motion_less_the_rigid_motion_do
     def watched(
         response: Floats, dt: float, mass: float, hits: responses.Hits, mobility: float
     ) -> responses.ComputedImpacts:
-        made = responses.impacts(response, dt, mass, hits, mobility)
-        seen.append((made, response, dt, mobility, hits))
-        return made
+        built = responses.impacts(response, dt, mass, hits, mobility)
+        seen.append((built, response, dt, mobility, hits))
+        return built
 
     monkeypatch.setattr(backends, "impacts", watched)
     if solver == "numpy":
         without_kernels(monkeypatch)
     speeds = np.linspace(10.0, 300.0, 11)
     fecm.sweep(small(FREE), {"velocity": speeds.tolist()})
-    ((found, response, dt, mobility, hits),) = seen
+    ((actual, response, dt, mobility, hits),) = seen
     assert mobility == pytest.approx(1.0 / (0.000148 * 2.0 * 2.0 * 0.106), rel=1e-9)
     steps = len(response)
     bending = response - mobility * dt**2 * np.arange(1, steps + 1)
-    before = np.vstack([np.zeros(len(speeds)), found.force[:-1]])
+    before = np.vstack([np.zeros(len(speeds)), actual.force[:-1]])
     bent = np.stack([np.convolve(bending, force)[:steps] for force in before.T], axis=1)
-    work = np.cumsum(0.5 * (before + found.force) * np.diff(bent, axis=0, prepend=0.0), axis=0)
+    work = np.cumsum(0.5 * (before + actual.force) * np.diff(bent, axis=0, prepend=0.0), axis=0)
     times: Floats = np.linspace(dt, steps * dt, steps)
     energy = 0.5 * hits.rods[0].total_mass * speeds**2
     wanted = Deflection.of(bent, times, work, energy)
-    np.testing.assert_allclose(found.plate.speed, wanted.speed, rtol=1e-10)
-    np.testing.assert_allclose(found.plate.compliance, wanted.compliance, rtol=1e-10)
-    np.testing.assert_allclose(found.plate.energy, wanted.energy, rtol=1e-9)
+    np.testing.assert_allclose(actual.plate.speed, wanted.speed, rtol=1e-10)
+    np.testing.assert_allclose(actual.plate.compliance, wanted.compliance, rtol=1e-10)
+    np.testing.assert_allclose(actual.plate.energy, wanted.energy, rtol=1e-9)
 
 
 @compiled
@@ -189,6 +189,6 @@ def test_a_law_that_the_kernels_do_not_know_is_numpys() -> None:
         speed = np.array([50.0, 100.0, 150.0])
         hits = responses.Hits([RigidMass(1.8e-4)], kind, one, HystereticLaw(constants), speed)
         forces.append(responses.impacts(response, 2e-7, 1e-6, hits).force)
-    found, wanted = forces
-    assert not np.array_equal(found, wanted)
-    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-10 * wanted.max())
+    actual, wanted = forces
+    assert not np.array_equal(actual, wanted)
+    np.testing.assert_allclose(actual, wanted, rtol=0.0, atol=1e-10 * wanted.max())

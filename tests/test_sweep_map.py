@@ -190,8 +190,8 @@ def test_thresholds_of_different_plates_are_drawn_case_by_case() -> None:
     contour: Any = axes.collections[-1]
     (path,) = contour.get_paths()
     expected = [[0.1, 20.0 + 180.0 * share[0]], [0.12, 20.0 + 180.0 * share[1]]]
-    found = path.vertices[np.argsort(path.vertices[:, 0])][[0, -1]]
-    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    actual = path.vertices[np.argsort(path.vertices[:, 0])][[0, -1]]
+    np.testing.assert_allclose(actual, expected, rtol=1e-6)
 
 
 def test_over_says_which_value_lies_across(plane: SweepResult) -> None:
@@ -322,8 +322,8 @@ def test_cases_still_in_contact_are_crossed_and_counted(vary: dict[str, list[flo
     cross = figure.axes[0].get_lines()[-1]
     assert cross.get_marker() == "x"
     assert data_of(cross)[0].tolist() == sweep["velocity"][sweep.still_in_contact].tolist()
-    told = f"still in contact at the end: {count} of {len(sweep)} cases"
-    assert footer_of(figure) == f"\N{MULTIPLICATION SIGN} {told}"
+    text = f"still in contact at the end: {count} of {len(sweep)} cases"
+    assert footer_of(figure) == f"\N{MULTIPLICATION SIGN} {text}"
     with pytest.warns(FecmWarning, match="they have no value in the picture"):
         plot(sweep, "impulse")
 

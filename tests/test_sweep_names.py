@@ -93,10 +93,10 @@ def test_a_case_is_the_deck_that_new_writes_with_its_values(number: int, patch: 
 @pytest.mark.parametrize("number", [0, 1, 5, 6])
 def test_the_mesh_of_a_case_is_that_of_new(number: int) -> None:
     case, options = CASES[number]
-    made, expected = generate(apply_case(new(), case)), generate(new(**options))
-    np.testing.assert_allclose(made.coordinates, expected.coordinates, rtol=1e-14, atol=1e-12)
-    np.testing.assert_array_equal(made.codes != 0, expected.codes != 0)
-    np.testing.assert_array_equal(made.elements, expected.elements)
+    built, expected = generate(apply_case(new(), case)), generate(new(**options))
+    np.testing.assert_allclose(built.coordinates, expected.coordinates, rtol=1e-14, atol=1e-12)
+    np.testing.assert_array_equal(built.codes != 0, expected.codes != 0)
+    np.testing.assert_array_equal(built.elements, expected.elements)
 
 
 def test_an_energy_is_half_of_mass_times_velocity_squared() -> None:
@@ -168,10 +168,10 @@ def test_a_radius_is_the_k_of_indent_estimate_for_a_steel_sphere() -> None:
 
 def test_centre_of_patch_and_gages_are_scaled_with_the_plate() -> None:
     deck = gaged().with_(x0=40, y0=20)
-    made = deck.with_(size=(50, 160))
-    patch = made.require(Patch)
+    built = deck.with_(size=(50, 160))
+    patch = built.require(Patch)
     assert (patch.x, patch.y) == (20.0, 40.0)
-    places = [(gage.x, gage.y, gage.z) for gage in made.require(fecm.deck.model.Gages).records]
+    places = [(gage.x, gage.y, gage.z) for gage in built.require(fecm.deck.model.Gages).records]
     assert places == [(15.0, 40.0, 1.0), (30.0, 120.0, -1.0)]
     assert deck.with_(size="50x160", at=(10, 30)).require(Patch).x == 10.0
 

@@ -47,9 +47,9 @@ def test_a_part_with_any_byte_changed_or_cut_off_is_damaged(made: Plan, tmp_path
     parts.put(task, run_task(task))
     (path,) = parts.folder.glob("task-*.npz")
     data = path.read_bytes()
-    found = parts.get(task)
-    assert found is not None
-    assert found.force is not None
+    actual = parts.get(task)
+    assert actual is not None
+    assert actual.force is not None
     random = np.random.default_rng(3)
     for at in random.integers(len(data), size=100).tolist():
         path.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
@@ -314,10 +314,10 @@ def test_no_other_command_writes_the_output_of_a_sweep_that_is_running(
 def workers_of(pid: int) -> list[int]:
     """Worker processes that a process has started."""
     try:
-        found = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        actual = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     except OSError:
         return []
-    return [int(child) for child in found if b"spawn_main" in arguments_of(int(child))]
+    return [int(child) for child in actual if b"spawn_main" in arguments_of(int(child))]
 
 
 def arguments_of(pid: int) -> bytes:

@@ -134,8 +134,8 @@ def test_in_plane_unknowns_that_rest_do_not_limit_the_time_step() -> None:
 def _critical(deck: Deck) -> list[str]:
     from fecm.problem.summary import deck_summary
 
-    made = deck_summary(load_deck(deck).problems[0])
-    return [line for line in made.lines() if "critical" in line]
+    built = deck_summary(load_deck(deck).problems[0])
+    return [line for line in built.lines() if "critical" in line]
 
 
 def _run(deck: Deck) -> fecm.Result:

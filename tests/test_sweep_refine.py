@@ -114,8 +114,8 @@ def test_the_deck_of_a_sweep_is_never_read_as_a_path(tmp_path: Path) -> None:
     cases = {"refine": np.array([1, 2, 4])}
     summary = {"peak_force": power_law(3.5)[:3], "status": np.full(3, "ok")}
     one = np.ones(3)
-    found = SweepResult(cases, summary, one, one, deck_text=str(tmp_path / "other.inp"))
-    assert "the scheme has order 2" in found.convergence["peak_force"].remark
+    actual = SweepResult(cases, summary, one, one, deck_text=str(tmp_path / "other.inp"))
+    assert "the scheme has order 2" in actual.convergence["peak_force"].remark
     whole = SweepResult(cases, summary, one, one, deck_text=plate().to_text())
     assert not whole.convergence["peak_force"].remark
 

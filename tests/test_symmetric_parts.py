@@ -208,8 +208,8 @@ def test_a_part_reaches_the_threshold_when_the_whole_plate_does(tmp_path: Path) 
 def test_the_rigid_motion_of_a_free_part_is_that_of_the_whole_plate(part: str) -> None:
     free = whole_deck("free", duration=3e-4)
     notes, expected = (
-        [note.split(" at (")[0] for note in fecm.run_one(made).notes]
-        for made in (part_of(free, PARTS[part]), free)
+        [note.split(" at (")[0] for note in fecm.run_one(built).notes]
+        for built in (part_of(free, PARTS[part]), free)
     )
     assert notes == expected
     assert expected[0].startswith("the deflection without the rigid-body motion reaches")

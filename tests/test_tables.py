@@ -170,8 +170,8 @@ def distorted(count: int) -> Deck:
     places[::2] += chance.random((len(places[::2]), 2))
     values = np.column_stack((np.arange(1, nodes + 1), np.zeros(nodes), places))
     deck = fecm.read_one(small())
-    made = Coordinates.of(deck.control, values)
-    return replace(deck, segments=(made, *deck.segments[1:]), text="")
+    built = Coordinates.of(deck.control, values)
+    return replace(deck, segments=(built, *deck.segments[1:]), text="")
 
 
 @pytest.mark.parametrize("free", [True, False], ids=["commas", "columns"])
@@ -192,23 +192,23 @@ def test_sound_lines_are_not_read_card_by_card(free: bool, monkeypatch: pytest.M
 
 
 def test_a_table_behaves_as_the_tuple_of_its_records() -> None:
-    made = distorted(5).require(Coordinates).records
-    records = tuple(made)
-    assert isinstance(made, CardTable)
-    assert len(made) == 25
-    assert isinstance(made[3].node, int)
-    assert made == records
-    assert records == made
-    assert made == copy.deepcopy(made)
-    assert made != records[:-1]
-    assert made != list(records)
-    assert hash(made) == hash(records)
-    assert repr(made) == repr(records)
-    assert pickle.loads(pickle.dumps(made)) == made  # what this test wrote
-    assert (made[-1], made[1:5:2], made + records) == (records[-1], records[1:5:2], records * 2)
-    assert (*records, *records) == records + made
+    built = distorted(5).require(Coordinates).records
+    records = tuple(built)
+    assert isinstance(built, CardTable)
+    assert len(built) == 25
+    assert isinstance(built[3].node, int)
+    assert built == records
+    assert records == built
+    assert built == copy.deepcopy(built)
+    assert built != records[:-1]
+    assert built != list(records)
+    assert hash(built) == hash(records)
+    assert repr(built) == repr(records)
+    assert pickle.loads(pickle.dumps(built)) == built  # what this test wrote
+    assert (built[-1], built[1:5:2], built + records) == (records[-1], records[1:5:2], records * 2)
+    assert (*records, *records) == records + built
     with pytest.raises(IndexError):
-        made[25]
+        built[25]
 
 
 def test_records_of_a_table_know_their_cards_after_a_pickle() -> None:

@@ -30,7 +30,7 @@ def body(text: str) -> str:
 def test_every_work_that_is_cited_is_listed_and_every_one_that_is_listed_is_cited() -> None:
     texts = [page.read_text(encoding="utf-8") for page in PAGES]
     (references,) = (text.split(LIST)[1] for text in texts if LIST in text)
-    cited = {found for text in texts for found in CITED.findall(body(text))}
+    cited = {actual for text in texts for actual in CITED.findall(body(text))}
     listed = set(LISTED.findall(references))
     assert len(listed) > 30
     assert cited == listed

@@ -60,9 +60,9 @@ def test_the_flight_of_a_free_plate_is_no_deflection(tmp_path: Path) -> None:
     loads = np.outer(share, share).ravel()
     cards = "".join(f"{n}, 0, 0., 0., {100.0 * load}\n" for n, load in enumerate(loads, start=1))
     text = small(LONG.replace("RODP          5", "EXCD"), data=f"FORC\n{cards}\n" + MATERIAL)
-    found, result = notes(tmp_path, text)
+    actual, result = notes(tmp_path, text)
     assert np.abs(result.tape3.w).max() > 0.106
-    assert found == []
+    assert actual == []
 
 
 MATERIAL = """\
@@ -83,8 +83,8 @@ def test_the_strain_of_a_loaded_square_is_that_of_its_corners(tmp_path: Path, lo
     cards, blank, rest = after.partition("\n\n")
     rows = [card.split(",") for card in cards.splitlines()]
     scaled = "\n".join(f"{','.join(row[:-1])}, {float(row[-1]) * load}" for row in rows)
-    found, _ = notes(tmp_path, f"{before}FORC\n{scaled}{blank}{rest}")
-    lines = [line for line in found if "strain" in line]
+    actual, _ = notes(tmp_path, f"{before}FORC\n{scaled}{blank}{rest}")
+    lines = [line for line in actual if "strain" in line]
     assert len(lines) == (expected > 0.01)
     if lines:
         assert numbers(lines[0])[0] == pytest.approx(100.0 * expected, rel=0.02)
@@ -93,9 +93,9 @@ def test_the_strain_of_a_loaded_square_is_that_of_its_corners(tmp_path: Path, lo
 
 def test_strains_of_gages_are_judged(tmp_path: Path) -> None:
     text = PULSE.replace("MATE", "GAGE\n1, .3, .3, .05, 45.\n\nMATE")
-    found, result = notes(tmp_path, text.replace("DISP          4\n", ""))
+    actual, result = notes(tmp_path, text.replace("DISP          4\n", ""))
     strain = np.abs(result.gages.strain[:, 0])
-    (line,) = [line for line in found if "strain" in line]
+    (line,) = [line for line in actual if "strain" in line]
     value, x, y, time = numbers(line)[:4]
     assert value == pytest.approx(100.0 * strain.max(), rel=1e-3)
     assert (x, y) == (0.3, 0.3)
@@ -105,10 +105,10 @@ def test_strains_of_gages_are_judged(tmp_path: Path) -> None:
 def test_an_indentation_beyond_a_quarter_of_the_thickness_is_told(tmp_path: Path) -> None:
     for k, expected in ((" 1912000.", False), ("     500.", True)):
         text = small(LONG.replace("100", "800")).replace(" 1912000.", k)
-        found, result = notes(tmp_path, text)
+        actual, result = notes(tmp_path, text)
         step = int(result.indentation.argmax())
         assert (result.indentation[step] > 0.0265) == expected
-        lines = [line for line in found if "indentation" in line]
+        lines = [line for line in actual if "indentation" in line]
         assert len(lines) == expected
         for line in lines:
             assert numbers(line)[0] == pytest.approx(result.indentation[step], rel=1e-3)
@@ -121,21 +121,21 @@ def test_an_exposure_above_1_is_told_once(tmp_path: Path, strength: str, exceede
     allowables = ",".join([strength] * 5)
     program = LONG.replace("NEXT", "FAIL,,20\nNEXT")
     text = small(program).replace("EXPE", f"PATC\nDISC,.2\nALLO\n{allowables}\n\nEXPE")
-    found, _ = notes(tmp_path, text)
-    lines = [line for line in found if "exposure above 1" in line]
+    actual, _ = notes(tmp_path, text)
+    lines = [line for line in actual if "exposure above 1" in line]
     assert len(lines) == exceeded
     assert all("elastically" in line for line in lines)
 
 
 def test_a_run_in_python_warns_the_same_with_and_without_a_file(tmp_path: Path) -> None:
     text = small(LONG, mesh=HELD).replace("115.0", "50000")
-    told, _ = notes(tmp_path, text)
+    message, _ = notes(tmp_path, text)
     for output in (None, tmp_path / "p.h5"):
         with pytest.warns(fecm.FecmWarning) as caught:
             fecm.run_one(text, output=output)
         lines = [line for warning in caught for line in str(warning.message).splitlines()]
         texts = [f"fecm: note: {line}" for line in lines]
-        assert [text for text in texts if "beyond" in text] == told
+        assert [text for text in texts if "beyond" in text] == message
 
 
 def test_an_estimate_warns_of_its_static_plate(tmp_path: Path) -> None:

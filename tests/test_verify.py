@@ -33,8 +33,8 @@ PAGE = ROOT / "docs" / "verification.md"
 def check_of(case: str, quantity: str) -> Check:
     """A check by its case and the beginning of its quantity."""
     (one,) = chosen([case])
-    (found,) = [check for check in one.checks if check.quantity.startswith(quantity)]
-    return found
+    (actual,) = [check for check in one.checks if check.quantity.startswith(quantity)]
+    return actual
 
 
 # Output ------------------------------------------------------------------------------------------
@@ -56,8 +56,8 @@ SLOW = ("large-mass", "location", "reduced-plate")
     [pytest.param(c.name, marks=pytest.mark.long if c.name in SLOW else ()) for c in CASES],
 )
 def test_every_row_is_within_its_tolerance(name: str) -> None:
-    found = rows_of(name)
-    assert [(row.check.quantity, row.error, row.failure) for row in found if not row.within] == []
+    actual = rows_of(name)
+    assert [(row.check.quantity, row.error, row.failure) for row in actual if not row.within] == []
 
 
 @pytest.mark.long
@@ -209,13 +209,13 @@ def test_paganos_printed_sandwich_is_that_of_the_exact_solution(ratio: int) -> N
 
 
 def test_the_deck_made_in_python_is_the_reports() -> None:
-    made, given = report_impact(), fecm.read_deck(LONG)
+    built, given = report_impact(), fecm.read_deck(LONG)
     assert isinstance(given, Deck)
-    ours, theirs = generate(made), generate(given)
+    ours, theirs = generate(built), generate(given)
     for name in ("coordinates", "elements", "codes", "equations"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
-    assert made.require(Material) == given.require(Material)
-    (dt,) = [macro.value for macro in made.macros if macro.word == "DT"]
+    assert built.require(Material) == given.require(Material)
+    (dt,) = [macro.value for macro in built.macros if macro.word == "DT"]
     assert dt == 2e-7
 
 
@@ -399,8 +399,8 @@ def test_figures_of_patches_and_plies_are_those_of_the_reference_files() -> None
             shape=shape,
             **{"c (radius or half side)": "0.5"},
         )
-        found = check_of("patch-compliance", f"W, {shape.replace('h', 'H')}").expected
-        assert found == pytest.approx(given[0], rel=4e-6)
+        actual = check_of("patch-compliance", f"W, {shape.replace('h', 'H')}").expected
+        assert actual == pytest.approx(given[0], rel=4e-6)
     given = at(
         "patch_impact_summary.csv",
         "report-ply",

@@ -90,9 +90,9 @@ def test_broken_physics_is_seen(
     BREAKS[name][0](monkeypatch)
     (one,) = chosen([case])
     with np.errstate(all="ignore"):
-        found = compute_rows(one)
+        actual = compute_rows(one)
     for beginning in quantities:
-        rows = [row for row in found if row.check.quantity.startswith(beginning)]
+        rows = [row for row in actual if row.check.quantity.startswith(beginning)]
         assert rows, f"no quantity of {case} begins with {beginning}"
         assert not [row.check.quantity for row in rows if row.within]
         # A break that raises an error of Python's is broken itself.

@@ -51,7 +51,7 @@ def column(rows: list[dict[str, str]], name: str) -> Floats:
 def test_flexural_waves_have_the_reference_files_velocities_and_frequencies(angle: str) -> None:
     rows = [row for row in table("waves_dispersion.csv") if row["alpha_deg"] == angle]
     assert len(rows) == 30
-    found = dispersion(Medium(report_plate()), float(angle), column(rows, "lambda_over_h"))
+    actual = dispersion(Medium(report_plate()), float(angle), column(rows, "lambda_over_h"))
     for n, (velocity, frequency) in enumerate(
         [
             ("mode1_c_in/s", "mode1_omega_rad/s"),
@@ -61,9 +61,9 @@ def test_flexural_waves_have_the_reference_files_velocities_and_frequencies(angl
     ):
         assert MODES[n] == f"flexural_{n + 1}"
         expected = column(rows, velocity)
-        np.testing.assert_allclose(found.phase_velocity[:, n], expected, rtol=1e-8)
+        np.testing.assert_allclose(actual.phase_velocity[:, n], expected, rtol=1e-8)
         expected = column(rows, frequency)
-        np.testing.assert_allclose(found.angular_frequency[:, n], expected, rtol=1e-8)
+        np.testing.assert_allclose(actual.angular_frequency[:, n], expected, rtol=1e-8)
 
 
 def test_fronts_have_the_reference_files_normal_velocities(report: WaveSurfaces) -> None:
@@ -91,8 +91,8 @@ def test_fronts_have_the_reference_files_rays_and_positions(
     np.testing.assert_allclose(fronts.ray_angle[:, place], directions, atol=1e-6)
     for time in (2, 4, 5, 8, 10):
         expected = np.stack([column(rows, f"{axis}_t{time}us") for axis in "xy"], axis=1)
-        found = fronts.positions(time * 1e-6, 0.106)[:, place]
-        np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-7 * 0.106)
+        actual = fronts.positions(time * 1e-6, 0.106)[:, place]
+        np.testing.assert_allclose(actual, expected, rtol=1e-7, atol=1e-7 * 0.106)
 
 
 @pytest.mark.parametrize("angle", [0.0, 25.0, 45.0, 110.0])
@@ -117,17 +117,17 @@ def test_the_reports_two_groups_are_a_special_case_of_the_five_equations(
         np.sort(np.linalg.eigvals(np.array(flexural) / np.array([[i], [i], [p]]))),
         np.sort(np.linalg.eigvals(np.array(in_plane) / p))[::-1],
     )
-    found = dispersion(Medium(plate), angle, [wavelength]).phase_velocity[0]
-    np.testing.assert_allclose(found**2, np.concatenate(groups), rtol=1e-9)
+    actual = dispersion(Medium(plate), angle, [wavelength]).phase_velocity[0]
+    np.testing.assert_allclose(actual**2, np.concatenate(groups), rtol=1e-9)
 
 
 def test_the_transverse_shear_factor_puts_the_cut_off_frequency_right() -> None:
     plate = report_plate()
     for factor, expected in ((1.0, np.sqrt(12.0)), (np.pi**2 / 12.0, np.pi)):
         medium = Medium(replace(plate, shear=factor * plate.shear))
-        found = dispersion(medium, 30.0, [1e8]).angular_frequency[0, 1:3]
+        actual = dispersion(medium, 30.0, [1e8]).angular_frequency[0, 1:3]
         exact = expected * np.sqrt(REPORT_PLY.g13 / REPORT_PLY.density) / plate.thickness
-        np.testing.assert_allclose(found, exact, rtol=1e-12)
+        np.testing.assert_allclose(actual, exact, rtol=1e-12)
 
 
 # A laminate that is coupled in every way, against a determinant of its own -----------------------
@@ -181,8 +181,8 @@ def velocities(matrix: list[list[Polynomial]]) -> Floats:
     """Roots of the determinant, rising."""
     roots = determinant(matrix).roots()
     assert np.abs(np.imag(roots)).max() < 1e-9 * np.abs(roots).max()
-    found: Floats = np.sort(np.sqrt(np.real(roots)))
-    return found
+    actual: Floats = np.sort(np.sqrt(np.real(roots)))
+    return actual
 
 
 @pytest.mark.parametrize("angle", [0.0, 17.0, 45.0, 90.0, 140.0])
@@ -194,10 +194,10 @@ def test_waves_of_an_unsymmetric_laminate_are_the_roots_of_its_determinant(
     plate = general_plate()
     assert np.abs(plate.B).min() > 1e-3 * np.abs(plate.B).max()
     k = 2.0 * np.pi / (wavelength * plate.thickness)
-    found = dispersion(Medium(plate), angle, [wavelength])
+    actual = dispersion(Medium(plate), angle, [wavelength])
     expected = velocities(entries(plate, angle, k))
-    np.testing.assert_allclose(np.sort(found.phase_velocity[0]), expected, rtol=1e-8)
-    np.testing.assert_allclose(found.angular_frequency, k * found.phase_velocity, rtol=1e-14)
+    np.testing.assert_allclose(np.sort(actual.phase_velocity[0]), expected, rtol=1e-8)
+    np.testing.assert_allclose(actual.angular_frequency, k * actual.phase_velocity, rtol=1e-14)
 
 
 @pytest.mark.parametrize("angles", [(0.0, 30.0, 70.0), (10.0, 80.0, 80.0), (40.0, 40.0, -50.0)])
@@ -231,8 +231,8 @@ def test_the_longest_flexural_wave_bends_the_plate_without_shear_or_membrane_for
         rigidity = curvature @ plate.D @ curvature - coupling @ relief
         ratio = np.array([1e6, 1e7, 1e8])
         k = 2.0 * np.pi / (ratio * plate.thickness)
-        found = dispersion(Medium(plate), angle, ratio).phase_velocity[:, 0]
-        np.testing.assert_allclose(found, k * np.sqrt(rigidity / plate.mass), rtol=1e-9)
+        actual = dispersion(Medium(plate), angle, ratio).phase_velocity[:, 0]
+        np.testing.assert_allclose(actual, k * np.sqrt(rigidity / plate.mass), rtol=1e-9)
 
 
 # Invariances ------------------------------------------------------------------------------------
@@ -372,8 +372,8 @@ def turns(path: Floats) -> Floats:
     """Cosine of the angle between one piece of a path and the next."""
     pieces = np.diff(path, axis=0)
     lengths = np.linalg.norm(pieces, axis=1)
-    found: Floats = (pieces[1:] * pieces[:-1]).sum(axis=1) / (lengths[1:] * lengths[:-1])
-    return found
+    actual: Floats = (pieces[1:] * pieces[:-1]).sum(axis=1) / (lengths[1:] * lengths[:-1])
+    return actual
 
 
 @pytest.mark.parametrize(("time", "radius"), [(2e-6, 0.106), (1e-5, 0.106), (3e-6, 0.0)])

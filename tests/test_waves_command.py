@@ -245,9 +245,9 @@ def test_the_picture_of_dispersion_shows_scaled_velocities_and_frequencies() -> 
         (velocity, 1.0 / unit, "phase_velocity"),
         (frequency, 0.106 / unit, "angular_frequency"),
     ):
-        found = drawn(axes)
-        assert len(found) == 2 * 5
-        for n, (x, y) in enumerate(found):
+        actual = drawn(axes)
+        assert len(actual) == 2 * 5
+        for n, (x, y) in enumerate(actual):
             np.testing.assert_allclose(x, curves[n // 5].wavelength)
             expected = factor * getattr(curves[n // 5], name)[:, n % 5]
             np.testing.assert_allclose(y, expected, rtol=1e-9)
@@ -370,11 +370,11 @@ def test_of_a_deck_with_several_problems_the_first_is_taken(tmp_path: Path) -> N
 def test_options_make_the_laminate_of_their_plies() -> None:
     ply = fecm.Ply(1.5, 0.3, 20, 1.5, 0.9, 0.8, 0.5)
     waves = fecm.waves(fecm.Laminate("0/30/70", ply, 0.1), units="m-N-s")
-    made, names = waves.medium.laminate, waves.units
+    built, names = waves.medium.laminate, waves.units
     assert names == {"length": "m", "force": "N", "time": "s"}
-    assert made.thickness == pytest.approx(0.3)
-    assert made.is_coupled
-    assert made.shear[0, 0] == pytest.approx(
+    assert built.thickness == pytest.approx(0.3)
+    assert built.is_coupled
+    assert built.shear[0, 0] == pytest.approx(
         general_plate().shear[0, 0]
         + 0.05 * (0.8 * 0.75 + 0.5 * 0.25)
         - 0.05 * (0.8 * np.cos(np.deg2rad(70)) ** 2 + 0.5 * np.sin(np.deg2rad(70)) ** 2)
