@@ -22,7 +22,7 @@ from fecm.plot.kinds import Picture
 from fecm.plot.pictures import save_picture
 from fecm.problem.generate import generate
 from fecm.problem.refine import refined_deck
-from fecm.verification.decks import impact_program, material, run_of_deck, struck_plate
+from fecm.verification.decks import history_program, material, run_of_deck, struck_plate
 
 END = 8.0e-4
 RIGHT = (77.2, 85.4)
@@ -48,7 +48,7 @@ def plate(grid: ElementGrid) -> Deck:
 
 def peaks(deck: Deck, dt: float) -> tuple[float, float]:
     """Peak forces of the first and of the second contact (lb)."""
-    found = run_of_deck(replace(deck, macros=impact_program(dt, round(END / dt)), text=""))
+    found = run_of_deck(replace(deck, macros=history_program(dt, round(END / dt)), text=""))
     first = found.time < 5e-4
     return float(found.force[first].max()), float(found.force[~first].max())
 

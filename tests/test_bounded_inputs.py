@@ -14,7 +14,7 @@ import pytest
 import fecm
 from fecm import FecmError, _inputs
 from fecm._inputs import InputError, parsed_toml, read_input
-from fecm.authoring.parameters import in_units
+from fecm.authoring.parameters import parameter_in_units
 from fecm.mechanics.joints import coincident, representatives, sides_of_cells
 from fecm.problem.plate_mesh import read_mesh
 from fecm.studies.rod_test.filters import recorded
@@ -170,7 +170,7 @@ def test_a_physical_group_with_a_long_name_is_refused_before_meshio_reads_it(
     [
         lambda: parse_vary("velocity=" + "," * 100_000 + "x"),
         lambda: parse_vary("velocity=1:2:" + "9" * 5000),
-        lambda: in_units("length", "1" * 100_000 + "!", "length", "mm-N-s"),
+        lambda: parameter_in_units("length", "1" * 100_000 + "!", "length", "mm-N-s"),
     ],
     ids=["commas", "digits of a count", "digits of a value"],
 )

@@ -541,7 +541,7 @@ def struck(n: int, case: dict[str, str], duration: float) -> Deck:
         decks.material(PLY, ANGLES, 0.269),
     )
     dt = TIME_STEPS[n]
-    return decks.deck(grid, segments, decks.impact_program(dt, int(duration / dt) + 2))
+    return decks.deck(grid, segments, decks.history_program(dt, int(duration / dt) + 2))
 
 
 def summary_of(case: str) -> dict[str, str]:

@@ -21,7 +21,12 @@ from fecm.authoring.laminate import (
     toughness_of,
 )
 from fecm.authoring.mesh import MembraneSupport, place_impact, support_plate
-from fecm.authoring.parameters import ObjectError, check_kind, in_units, projectile_in_units
+from fecm.authoring.parameters import (
+    ObjectError,
+    check_kind,
+    parameter_in_units,
+    projectile_in_units,
+)
 from fecm.authoring.plate import Plate, Support
 from fecm.authoring.plate_values import swapped
 from fecm.authoring.strike_values import strike_of, struck_layers
@@ -152,7 +157,7 @@ def _in_deck_units(deck: Deck, values: Mapping[str, Any]) -> dict[str, Any]:
     """Convert texts with a unit, as in ``10J``, to the units of the deck."""
     system = system_of(deck)
     return {
-        name: in_units(name, value, dimension_of(name), system)
+        name: parameter_in_units(name, value, dimension_of(name), system)
         if system and dimension_of(name) in EXAMPLES and _is_single(value)
         else value
         for name, value in values.items()

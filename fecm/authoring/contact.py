@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fecm.authoring.laminate import DeckPlies
-from fecm.authoring.parameters import ObjectError, check_numbers, check_positive, in_units
+from fecm.authoring.parameters import ObjectError, check_numbers, check_positive, parameter_in_units
 from fecm.authoring.plate import DropWeight
 from fecm.deck.catalogue import (
     CONTACTS,
@@ -51,11 +51,11 @@ class Sphere:
 
     def radius_in(self, system: str | None) -> float | None:
         """Return the radius in a system of units; raise ObjectError if its unit needs a system."""
-        return in_units("radius", self.radius, "length", system)
+        return parameter_in_units("radius", self.radius, "length", system)
 
     def modulus_in(self, system: str | None) -> float | None:
         """Return the modulus in a system of units; raise ObjectError if its unit needs a system."""
-        return in_units("modulus", self.modulus, MODULUS, system)
+        return parameter_in_units("modulus", self.modulus, MODULUS, system)
 
     def law(self, plies: DeckPlies, layers: Sequence[Layer]) -> tuple[Indentation, str]:
         """Return the contact law on layers, and comment lines that explain the estimate of k."""
@@ -224,7 +224,7 @@ def parse_patch(text: str, system: str | None) -> Patch | None:
         raise ObjectError(
             f"`patch` is {text!r}, not none, disc, hertz, disc:RADIUS or hertz:RADIUS"
         )
-    radius = in_units("patch", radius_text, "length", system) if colon else None
+    radius = parameter_in_units("patch", radius_text, "length", system) if colon else None
     check_positive(patch=radius)
     return Patch(PATCHES[shape], radius)
 

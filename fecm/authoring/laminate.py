@@ -13,7 +13,7 @@ import numpy as np
 from fecm._errors import did_you_mean
 from fecm._table import Row, Table, html_table
 from fecm._typing import Floats
-from fecm.authoring.parameters import ObjectError, check_numbers, check_positive, in_units
+from fecm.authoring.parameters import ObjectError, check_numbers, check_positive, parameter_in_units
 from fecm.deck import catalogue
 from fecm.deck.catalogue import MATERIALS, STANDARD, NamedPly
 from fecm.deck.findings import Findings
@@ -235,7 +235,7 @@ class Laminate:
         if isinstance(default, Mapping):
             default = default.get(ply.name)
         stated = default if ply.thickness is None else ply.thickness
-        thickness = in_units("ply_thickness", stated, "length", system)
+        thickness = parameter_in_units("ply_thickness", stated, "length", system)
         check_positive(ply_thickness=thickness)
         return thickness
 

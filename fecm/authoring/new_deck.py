@@ -62,9 +62,9 @@ from fecm.authoring.numerics import (
 from fecm.authoring.parameters import (
     ObjectError,
     check_positive,
-    in_units,
     is_finite,
     lengths_in_units,
+    parameter_in_units,
     projectile_in_units,
 )
 from fecm.authoring.plate import DropWeight, Plate
@@ -231,7 +231,7 @@ def plate_deck(options: PlateDeckOptions) -> model.Deck:
     laminates = laminates_of(options.laminate, zones)
     system = STANDARD if options.test else system_asked(options.units)
     plies, in_zones = deck_plies(options.laminate, laminates, system, [])
-    force = in_units("force", options.force, "force", plies.system)
+    force = parameter_in_units("force", options.force, "force", plies.system)
     if force is not None and not is_finite(force):
         raise ObjectError(f"`force` is {options.force!r}; it must be a finite number")
     patch = None if force is None else contact_patch(options, plies.system)
@@ -285,7 +285,7 @@ def author(options: ImpactOptions) -> Authored:
     laminates = laminates_of(options.laminate, zones)
     plies, in_zones = deck_plies(options.laminate, laminates, STANDARD if test else units, notes)
     motion = _parse_motion(options, plies)
-    giic = in_units("giic", options.giic, TOUGHNESS, plies.system)
+    giic = parameter_in_units("giic", options.giic, TOUGHNESS, plies.system)
     check_positive(giic=giic)
     if fixture is not None and test is not None:
         options, motion = _apply_standard(test, options, motion, plies.thickness)
@@ -385,8 +385,8 @@ def assemble(
         law,
         shear_segment(options),
         curvature_of(
-            in_units("radius_x", options.radius_x, "length", plies.system),
-            in_units("radius_y", options.radius_y, "length", plies.system),
+            parameter_in_units("radius_x", options.radius_x, "length", plies.system),
+            parameter_in_units("radius_y", options.radius_y, "length", plies.system),
         ),
         _preload_segment(options, plies),
         *plies.segments(),
@@ -433,10 +433,10 @@ def _parse_motion(options: ImpactOptions, plies: DeckPlies) -> Motion:
     """Return velocity, energy and duration in the units of the deck."""
     system = plies.system
     motion = Motion(
-        in_units("velocity", options.velocity, "length/time", system),
-        in_units("energy", options.energy, "force*length", system),
-        in_units("duration", options.duration, "time", system),
-        in_units("dt", options.dt, "time", system),
+        parameter_in_units("velocity", options.velocity, "length/time", system),
+        parameter_in_units("energy", options.energy, "force*length", system),
+        parameter_in_units("duration", options.duration, "time", system),
+        parameter_in_units("dt", options.dt, "time", system),
     )
     check_positive(
         energy=motion.energy,
@@ -498,7 +498,9 @@ def _preload_segment(options: DeckOptions, plies: DeckPlies) -> model.Preload | 
     if options.preload is None:
         return None
     values = list(options.preload) if isinstance(options.preload, Iterable) else []
-    forces = [in_units("preload", value, "force/length", plies.system) for value in values]
+    forces = [
+        parameter_in_units("preload", value, "force/length", plies.system) for value in values
+    ]
     numbers = [force for force in forces if is_finite(force)]
     if len(numbers) < len(values) or len(values) not in (2, 3):
         raise ObjectError(f"`preload` is {options.preload!r}, not N0x, N0y and perhaps N0xy")

@@ -44,7 +44,9 @@ def check_kind(name: str, value: object, kind: type | UnionType) -> None:
         raise ObjectError(f"`{name}` is {value!r}, not a {name} of fecm")
 
 
-def in_units(name: str, value: object, dimension: str, system: str | None) -> float | None:
+def parameter_in_units(
+    name: str, value: object, dimension: str, system: str | None
+) -> float | None:
     """Convert a parameter with a unit as :func:`fecm.deck.quantities.in_units`.
 
     Raises ObjectError if it can't be converted.
@@ -74,7 +76,7 @@ def lengths_in_units(
     items: list[float | str] = []
     with suppress(TypeError):  # not a sequence
         items = [] if isinstance(values, str) else list(values)
-    lengths = [in_units(name, item, "length", system) for item in items]
+    lengths = [parameter_in_units(name, item, "length", system) for item in items]
     numbers = [float(length) for length in lengths if length is not None]
     if not len(lengths) == len(numbers) == count:
         raise ObjectError(f"`{name}` is {values!r}, not {count} numbers")
@@ -88,7 +90,7 @@ def projectile_in_units(projectile: DeckProjectile | str, system: str | None) ->
     """
     if isinstance(projectile, DeckProjectile):
         return projectile
-    mass = in_units("projectile", projectile, MASS, system)
+    mass = parameter_in_units("projectile", projectile, MASS, system)
     check_positive(projectile=mass)
     assert mass is not None  # the projectile is not
     return RigidMass(mass)

@@ -26,7 +26,7 @@ from fecm.authoring.case import (
     pair_of_text,
     parts_of_pair,
 )
-from fecm.authoring.parameters import ObjectError, in_units
+from fecm.authoring.parameters import ObjectError, parameter_in_units
 from fecm.authoring.plate_values import PlateSetter, check_free_in_plane, free_in_plane
 from fecm.authoring.strike_values import Strike, StrikeSetter, strike_of
 from fecm.authoring.time_values import stable_time_step, with_time_step
@@ -285,7 +285,7 @@ def without_unit(name: str, text: str, system: str | None) -> str:
             "leave out the unit"
         )
     try:
-        return repr(in_units(name, text, dimension, system))
+        return repr(parameter_in_units(name, text, dimension, system))
     except ObjectError:
         raise CasesError(
             f"{name} must be a finite number, or one with a unit as in {EXAMPLES[dimension]}, not "

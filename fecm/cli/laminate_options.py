@@ -13,7 +13,7 @@ import click
 from click import option
 
 from fecm.authoring.laminate import Laminate as AuthoredLaminate
-from fecm.authoring.parameters import ObjectError, in_units
+from fecm.authoring.parameters import ObjectError, parameter_in_units
 from fecm.cli.options import (
     POSITIVE,
     SYSTEM,
@@ -67,7 +67,7 @@ class LaminateOptions:
         system = self.units or (None if self.named is None else self.named.system)
         thickness = (self.ply_thickness or {}).get("")
         try:
-            return in_units("ply_thickness", thickness, "length", system)
+            return parameter_in_units("ply_thickness", thickness, "length", system)
         except ObjectError as error:
             raise click.UsageError(as_options(str(error), vars(self))) from None
 
@@ -191,7 +191,7 @@ def _thickness(text: str) -> tuple[str, float | str]:
         return letter, float(POSITIVE.convert(value, None, None))
     except click.BadParameter:
         with suppress(ObjectError):
-            if (in_units("ply_thickness", value, "length", STANDARD) or 0.0) > 0.0:
+            if (parameter_in_units("ply_thickness", value, "length", STANDARD) or 0.0) > 0.0:
                 return letter, value
         raise
 

@@ -40,7 +40,7 @@ class Doubt(NamedTuple):
 
 
 class ModelLimit(NamedTuple):
-    """ModelLimit of a quantity.
+    """Limit of a quantity, with what is said beyond it.
 
     Attributes
     ----------

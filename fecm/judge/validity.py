@@ -50,7 +50,7 @@ IN_PLANE_WORDS = {
     InPlane.FREE: "edges free in the plane",
     InPlane.WINDOW: "on a window on which the plate slides",
 }
-# ModelLimit of the deflection over the thickness up to which the plate is taken as linear.
+# Limit of the deflection over the thickness up to which the plate is taken as linear.
 DEFLECTION = {
     InPlane.HELD: HELD_DEFLECTION,
     InPlane.FREE: FREE_DEFLECTION,
@@ -223,7 +223,7 @@ class Judge(NamedTuple):
 
     @property
     def deflection(self) -> ModelLimit:
-        """ModelLimit of the deflection of a linear plate over its thickness."""
+        """Limit of the deflection of a linear plate over its thickness."""
         return DEFLECTION[self.in_plane]
 
     def largest(self, limit: ModelLimit) -> float:

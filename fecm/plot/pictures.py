@@ -79,14 +79,14 @@ def imported(place: str) -> Callable[..., Picture]:
     return function
 
 
-def function_of(kind: str) -> Callable[..., Picture]:
+def drawing_of(kind: str) -> Callable[..., Picture]:
     """Import the function that draws a kind."""
     return imported(KINDS[kind_named(kind)].function)
 
 
 def options_of(kind: str) -> list[str]:
     """Return the names of the options that a kind takes."""
-    _, *options = inspect.signature(function_of(kind)).parameters  # the first are the results
+    _, *options = inspect.signature(drawing_of(kind)).parameters  # the first are the results
     return options
 
 
@@ -170,7 +170,7 @@ def draw(
 
     settings = dict(RC if style is None else style)
     with matplotlib.rc_context(settings), _errors_as_one(f"{kind} of {' and '.join(results)}"):
-        return function_of(kind)(results, **options)
+        return drawing_of(kind)(results, **options)
 
 
 def draw_results(
@@ -231,7 +231,7 @@ def draw_results(
         picture = draw(kind, results, **options)
         save_picture(picture, Path(path), overwrite=overwrite)
         return picture.figure.axes[0]
-    function_of(kind)  # without matplotlib, this says what to install
+    drawing_of(kind)  # without matplotlib, this says what to install
     from matplotlib import pyplot
 
     from fecm.plot.style import TARGET, style_on

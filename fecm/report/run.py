@@ -48,7 +48,7 @@ from fecm.results.summary import (
     radii_of,
     run_table,
     search_for,
-    threshold_force,
+    threshold_in_words,
     threshold_verdict,
 )
 
@@ -197,7 +197,7 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     else:
         parts.append("there was no contact")
     if result.threshold:
-        limit = "; ".join([f"delamination {threshold_force(result)}", *lowest_criterion(result)])
+        limit = "; ".join([f"delamination {threshold_in_words(result)}", *lowest_criterion(result)])
         parts.append(f"the threshold ({limit}) is {threshold_verdict(result)}")
         if math.isfinite(float(result.threshold["time"])):
             parts.append(search_for(*THRESHOLD_EVENT))

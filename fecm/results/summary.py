@@ -290,7 +290,7 @@ def _membrane(result: Stored) -> str:
 
 def _delamination(result: Stored) -> str:
     """Format the threshold, whether it is reached, and the forces for other delaminations."""
-    verdict = f"{threshold_force(result)}, {threshold_verdict(result)}"
+    verdict = f"{threshold_in_words(result)}, {threshold_verdict(result)}"
     threshold = result.threshold
     band, number, interfaces = (
         np.asarray(threshold.get(name, "")) for name in ("band", "number", "interfaces")
@@ -400,7 +400,7 @@ def _at_rest(largest: LargestExposure) -> str:
     return f"{text}, 1 at {largest.load_factor:.4g} of the load's stresses"
 
 
-def threshold_force(result: Stored) -> str:
+def threshold_in_words(result: Stored) -> str:
     """Return the threshold of delamination, and from which number of delaminations it is."""
     threshold = result.threshold
     force = _quantity(result, float(threshold["force"]), "force")
@@ -545,7 +545,7 @@ def elastic_doubt(result: Stored, peak: float) -> str:
     """Say why a peak force is only an elastic prediction; empty if it may be real."""
     beyond = []
     if result.threshold and peak > THRESHOLD.value * float(result.threshold["force"]):
-        beyond.append(f"delamination is expected {threshold_force(result)}")
+        beyond.append(f"delamination is expected {threshold_in_words(result)}")
     if any(exposure.exposure > EXPOSURE.value for exposure in largest_exposures(result)):
         beyond.append("the first ply fails before")
     return f"elastic prediction; {', and '.join(beyond)}" if beyond else ""

@@ -271,7 +271,7 @@ class RunVerdict(NamedTuple):
 
 
 class Beyond(NamedTuple):
-    """ModelLimit of the model that a run exceeds."""
+    """Limit of the model that a run exceeds."""
 
     limit: ModelLimit
     note: str

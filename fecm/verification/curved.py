@@ -73,7 +73,7 @@ def _curved_impact() -> Sequence[Value]:
     """Compute the impact of a mass of 20 g at 3 m/s until 200 us."""
     grid, patch = refined_grid(4.0), model.Patch("DISC", 4.0)
     hit = (Projectile(0, 0, 2.0e-5), Impact(middle_node(grid), 3, 3000.0), decks.elastic(5.0e4))
-    macros = decks.impact_program(1.6e-7, 1250)
+    macros = decks.history_program(1.6e-7, 1250)
     result = panel(Curvature(radius_x=500.0), grid, macros, patch, *hit)
     return [*largest_force(result), result.plate_w[-1]]
 

@@ -65,7 +65,7 @@ def program(text: str) -> tuple[Macro, ...]:
     return tuple(Macro(word, value=float(value or 0.0)) for word, _, value in parts)
 
 
-def impact_program(dt: float, steps: int) -> tuple[Macro, ...]:
+def history_program(dt: float, steps: int) -> tuple[Macro, ...]:
     """Return the macros of an impact that stores only the history."""
     return program(f"LMAS DT={dt!r} LOOP={steps} TIME RODP={steps} NEXT")
 
@@ -194,7 +194,7 @@ def struck_plate(
     """Build a plate without supports and an impact in its middle."""
     middle = grid.nearest(grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)[0]
     segments = (restraints(grid, FREE), projectile, model.Impact(middle, 3, velocity), law, plate)
-    return deck(grid, segments, impact_program(dt, steps))
+    return deck(grid, segments, history_program(dt, steps))
 
 
 def fixed_target(

@@ -98,7 +98,7 @@ def _tape8() -> Sequence[Value]:
     hit = (Projectile(0, 0, 1e-6), Impact(struck, 3, 1e-12), decks.elastic(1.0))
     plate = decks.material(FIBRES, (0.0, 90.0), 0.01)
     segments = (model.Boundary(tuple(codes)), decks.forces(field), *hit, plate)
-    result = decks.run_of_deck(decks.deck(grid, segments, decks.impact_program(1e-7, 1)))
+    result = decks.run_of_deck(decks.deck(grid, segments, decks.history_program(1e-7, 1)))
     names = "kappa_x kappa_y kappa_xy gamma_yz gamma_xz"
     return [field[:, 1:] for field in decks.field_values(result, "tape8", names)]
 

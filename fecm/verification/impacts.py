@@ -105,7 +105,7 @@ def _supported_plate() -> Sequence[Value]:
     """
     plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.03)
     hit = (Projectile(0, 0, 5.0e-6 / 4.0), Impact(1, 3, V), decks.elastic(1.0e5 / 4.0))
-    macros = decks.impact_program(8e-8, 2500)
+    macros = decks.history_program(8e-8, 2500)
     result = decks.run_of_deck(decks.quarter_plate(8, plate, macros, further=hit))
     _, time = largest_force(result)
     # The plate may still reach the projectile, so that the metrics leave the impulse open.
@@ -118,7 +118,7 @@ def _static_load() -> Sequence[Value]:
     """Compare impacts on a quarter plate under a pressure, and without it."""
     plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.03)
     hit = (Projectile(0, 0, 5.0e-6 / 4.0), Impact(1, 3, V), decks.elastic(1.0e5 / 4.0))
-    steps = decks.impact_program(1.2e-7, 800)
+    steps = decks.history_program(1.2e-7, 800)
     loaded, unloaded = (
         decks.run_of_deck(decks.quarter_plate(4, plate, macros, load, further=hit))
         for load, macros in ((20.0, (*decks.program("TANG FORM SOLV"), *steps)), (0.0, steps))
@@ -178,7 +178,7 @@ def _patch_impact() -> Sequence[Value]:
     hit = (Projectile(0, 0, 0.000181), Impact(middle, 3, 115.0), decks.elastic(1.912e6))
     return largest_force(
         decks.run_of_deck(
-            decks.pressed_rectangle(48, patch, decks.impact_program(1.0e-7, 1250), *hit)
+            decks.pressed_rectangle(48, patch, decks.history_program(1.0e-7, 1250), *hit)
         )
     )
 
@@ -206,7 +206,7 @@ def struck_square(mass: float, end: float) -> Deck:
     )
     deck = decks.deck(grid, segments, ())
     dt = rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
-    return replace(deck, macros=decks.impact_program(dt, round(end / dt)))
+    return replace(deck, macros=decks.history_program(dt, round(end / dt)))
 
 
 @case

@@ -140,7 +140,7 @@ def _stretching_impact() -> Sequence[Value]:
     )
     deck = decks.deck(grid, segments, ())
     dt = rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
-    deck = replace(deck, macros=decks.impact_program(dt, round(end / dt)))
+    deck = replace(deck, macros=decks.history_program(dt, round(end / dt)))
     result = decks.run_of_deck(deck)
     balance = np.abs(result.energy.balance_error).max() / result.energy.attributes["initial"]
     return [result.plate_w.max(), result.force.max(), balance]

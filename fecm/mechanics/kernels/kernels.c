@@ -56,7 +56,7 @@
 
 #define APART __attribute__((noinline)) /* for loops that need all registers: compilers assign them only there */
 #define TIE 1.0e-9 /* see fecm/mechanics/exposures.py */
-#define LEAST_WORK 1.0e-3 /* see fecm/results/end.py */
+#define LEAST_WORK 1.0e-3 /* see fecm/judge/end.py */
 #define TOLERANCE 1.0e-6
 #define MOST_THREADS 64
 #define MOST_SPINS 2000 /* spins of a waiting thread before it sleeps: some ten microseconds, the time of waking */
