@@ -52,7 +52,9 @@ def test_the_static_stiffness_of_d7136_is_that_of_another_code(plate: str) -> No
         "--dt",
         "1e-7",
         "--mesh",
-        "10x8",
+        "20x14",
+        "--grading",
+        "6",
         "--shear-factor",
         "1",
     )

@@ -192,11 +192,11 @@ def test_strains_and_force_of_a_run_are_those_of_the_series(
 
 @pytest.mark.long
 def test_strains_on_the_mesh_of_fecm_new_are_those_of_the_series_within_a_hundredth() -> None:
-    # 60 x 40 elements asked for are refined at the patch.
+    # The elements are as short as the radius of the patch.
     plain = public_panel(60, 40)
     material = plain.require(model.Material)
     deck = fecm.impact(
-        fecm.Plate.rectangle((300.0, 200.0), (60, 40), support="simple"),
+        fecm.Plate.rectangle((300.0, 200.0), (68, 46), support="simple", grading=1.25),
         fecm.Laminate("[0/90/0/90/0]s", material.ply, 0.2),
         fecm.RigidMass(2e-5),
         fecm.Contact(2e4, 0.0, 0.0, 1.5),
@@ -302,20 +302,21 @@ def of_a_run() -> Floats:
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("first", [0, 25, 50, 75])
 @pytest.mark.parametrize("strains_of", [of_a_run, lambda: PUBLIC[:, 2:6]], ids=["run", "series"])
 def test_the_95_percent_ellipse_covers_the_place_in_95_of_100(
-    strains_of: Callable[[], Floats],
+    strains_of: Callable[[], Floats], first: int
 ) -> None:
     deck, clean = public_panel(60, 40), strains_of()
     covered, off, errors = 0, [], []
     with warnings.catch_warnings(action="ignore"):
-        for seed in range(100):
+        for seed in range(first, first + 25):
             strains, _ = scatter(clean, NOISE, seed)
             series = of_the_series(deck, strains)
             covered += deviations(series, PUBLIC_PLACE) ** 2 < -2.0 * np.log(0.05)
             off.append((series.x - PUBLIC_PLACE[0], series.y - PUBLIC_PLACE[1]))
             errors.append((series.sd_x, series.sd_y))
-    assert 90 <= covered <= 100
+    assert covered >= 21  # of 25: 99 % of binomial samples
     ratio = np.sqrt(np.mean(np.square(off), axis=0)) / np.mean(errors, axis=0)
     assert (ratio < 1.3).all()
 

@@ -123,7 +123,7 @@ def test_the_estimate_bounds_what_is_measured(tmp_path: Path) -> None:
 
 
 ALONE = """
-from fecm.problem import load_deck
+from fecm.problem.loading import load_deck
 from fecm.problem.memory import needed_bytes
 fecm.run({small!r}, output="small.h5")
 fecm.run({static!r}, output="static.h5")

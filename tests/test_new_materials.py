@@ -386,7 +386,7 @@ def test_summary_json_page_and_picture_name_the_metal_that_yields(tmp_path: Path
     assert "1: 2024-T3" in page
     call("plot", "g.h5", "--kind", "failure", "-o", "g.svg", cwd=tmp_path)
     picture = (tmp_path / "g.svg").read_text()
-    assert ": yield," in picture
+    assert ": yield (" in picture
     assert "(2024-T3)" in picture
 
 

@@ -21,7 +21,6 @@ from fecm.cli.common import echo_json
 from fecm.cli.isolation import reads
 from fecm.cli.options import FORMAT_OPTION, NAMED_PATH, Format, typical
 from fecm.deck.units import declared_units
-from fecm.mechanics import kernels
 from fecm.results.hdf5_reader import FileContents, read
 from fecm.results.result import result_of
 from fecm.results.schema import Form
@@ -40,7 +39,10 @@ PERMANENT = "permanent_indentation"
 def _system(context: click.Context, _: object, asked: bool) -> None:
     if not asked:
         return
-    import scipy  # 10 ms, which a description does not need
+    # 10 ms each, which a description does not need.
+    import scipy
+
+    from fecm.mechanics import kernels
 
     for name, text in (
         ("fecm", __version__),

@@ -142,6 +142,7 @@ MOST_SOLVED = 1000  # elements up to which checks and notes take static solution
 # First step of a static curve: a fraction of the linear plate's deflection, and of the thickness.
 CURVE_STEPS = 20
 LONGEST_STEP = 0.25
+POINTS_BETWEEN = 101  # of two points of the curve, to find its largest force
 NO_CURVE = "there is no nonlinear static plate"
 # Simulated time over half a period of the projectile on the plate's static stiffness.  Least
 # simulated time over the contact with plate and indentation in series: the contact with a vibrating
@@ -202,8 +203,11 @@ def nonlinear_curve(problem: Problem, energy: float, force: float) -> StaticCurv
         curve = static_curve(problem.moving_plate, contact, step, enough)
     except (SingularStiffnessError, ConvergenceError) as error:
         raise NoCurveError(f"{NO_CURVE}: {error}") from None
-    if (falls := np.diff(curve.force) < 0.0).any():
-        limit = factor * float(curve.force[np.argmax(falls)])
+    if (falls := (np.diff(curve.force) < 0.0) | (curve.stiffness[1:] < 0.0)).any():
+        first = int(falls.argmax())
+        start, end = curve.deflection[first : first + 2]
+        between = np.linspace(start, end, POINTS_BETWEEN)
+        limit = factor * float(curve.at(between)[0].max())
         raise NoCurveError(f"{NO_CURVE}: the panel snaps through at the force {limit:.4g}")
     if factor == 1:
         return curve
