@@ -17,8 +17,10 @@ import fecm
 from fecm import Result
 from fecm._table import Table
 from fecm.deck.layup import layup_text, parse_layup
+from fecm.deck.material_cards import Layer
 from fecm.judge.criteria import ALL_CRITERIA
 from fecm.report.content import render
+from fecm.report.figures import stack
 from fecm.report.report import page_of
 from fecm.results.exposures import first_failures
 from fecm.results.metrics import METRICS
@@ -530,3 +532,14 @@ def test_the_range_of_a_sweep_says_how_many_cases_have_it() -> None:
     sweep = fecm.sweep(small(), {"velocity": [50.0, 80.0], "duration": [2e-6, 4e-4]})
     known = int(np.isfinite(sweep["peak_force"]).sum())
     assert f"in the {known} of 4 cases that have it" in page(sweep=sweep).text
+
+
+def test_each_ply_of_the_stack_has_its_angle_in_its_middle() -> None:
+    thicknesses = (0.5, 0.25, 1.0)
+    layers = [
+        Layer(n, angle, t)
+        for n, (angle, t) in enumerate(zip((0, 45, 90), thicknesses, strict=True), 1)
+    ]
+    (axes,) = stack(layers, {}).axes
+    labels = [(text.get_text(), text.get_position()[1]) for text in axes.texts]
+    assert labels == [("0°", 0.25), ("45°", 0.625), ("90°", 1.25)]
