@@ -1,8 +1,9 @@
 """Values of a new deck, declared once: name, type, default and help of each.
 
-:class:`ImpactOptions` has those of :func:`fecm.impact` and ``fecm new``, :class:`PlateDeckOptions`
-those of :func:`fecm.plate_deck`, and :class:`DeckOptions` those of both. Signatures, docstrings,
-options of the command and its help page follow from the fields. A parameter in backquotes is an
+:class:`ImpactOptions` has the values of :func:`fecm.impact` and ``fecm new``,
+:class:`PlateDeckOptions` the values of :func:`fecm.plate_deck`, and :class:`DeckOptions` the values
+that both take. Signatures, docstrings, options of the command and its help page follow from the
+fields. A parameter in backquotes is an
 option on the help page.
 """
 

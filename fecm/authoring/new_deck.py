@@ -72,7 +72,7 @@ from fecm.authoring.zones import ElementLaminates, laminates_of, placed_zones
 from fecm.deck import model
 from fecm.deck.catalogue import STANDARD, SYSTEM
 from fecm.deck.findings import DeckError
-from fecm.deck.material_cards import MATERIAL
+from fecm.deck.material_cards import MATERIAL, Layer
 from fecm.deck.model import Control, Gage
 from fecm.deck.reader import with_cards
 from fecm.deck.units import MODULUS, TOUGHNESS, quantity, unit_of, units_of
@@ -317,15 +317,7 @@ def author(options: ImpactOptions) -> Authored:
         doubts += doubts_of_core(plies, struck)
     if isinstance(options.contact, Sphere):
         doubts += doubts_of_sphere(options.contact, plies.system, test)
-    damage = damage_segments(plies, giic, notes) if options.damage else toughness_segment(giic)
-    if is_sandwich(plies, struck) and any(isinstance(s, model.Delamination) for s in damage):
-        damage = [s for s in damage if not isinstance(s, model.Delamination)]
-        notes.append(
-            "the deck has no delamination threshold (DELA): it holds for a solid laminate, and "
-            "the faces of a sandwich delaminate or leave the core far below it"
-        )
-    if options.failure and not any(isinstance(s, model.Allowables) for s in damage):
-        damage = [strengths_of(plies), *damage]
+    damage = _segments_of_failure(options, plies, struck, giic, notes)
     hit = model.Impact(node, 3, 1.0 if motion.velocity is None else motion.velocity)
     load = (_projectile_segment(options.projectile, plies.system), hit, patch)
     plain = assemble(options, plies, mesh, placed, load, damage, law)
@@ -338,12 +330,7 @@ def author(options: ImpactOptions) -> Authored:
     notes.append(energy_note(plain, plies, per_thickness=options.test is not None))
     is_bare = options.energy is not None and not str(options.energy).strip()[-1:].isalpha()
     doubts += doubts_of_energy(plain, fixture, plies, is_bare=is_bare)
-    if isinstance(options.contact, Sphere) and patch is not None:
-        radius = patch.radius or RADIUS_PER_THICKNESS[patch.shape] * plies.thickness
-        softest = min(plies.of(layer).ply.e2 for layer in struck)
-        doubts += doubts_of_soft_tip(
-            options.contact, plies.system, radius, law.k, energy_of(plain), softest
-        )
+    doubts += _doubts_of_tip(options, plain, plies, struck, law.k)
     title = options.title
     if title is None:
         named = title_of(options.plate, options.laminate, plies)
@@ -359,6 +346,38 @@ def author(options: ImpactOptions) -> Authored:
     deck = with_impact_program(options, structure.deck, dt, motion.duration)
     comments = (fixture.comment if fixture else "") + structure.comment + comment
     return Authored(deck, comments, [*notes, *structure.notes], doubts)
+
+
+def _segments_of_failure(
+    options: ImpactOptions,
+    plies: DeckPlies,
+    struck: Sequence[Layer],
+    giic: float | None,
+    notes: list[str],
+) -> list[model.Segment]:
+    """Return strengths and toughness; a sandwich has no delamination threshold."""
+    segments = damage_segments(plies, giic, notes) if options.damage else toughness_segment(giic)
+    if is_sandwich(plies, struck) and any(isinstance(s, model.Delamination) for s in segments):
+        segments = [s for s in segments if not isinstance(s, model.Delamination)]
+        notes.append(
+            "the deck has no delamination threshold (DELA): it holds for a solid laminate, and "
+            "the faces of a sandwich delaminate or leave the core far below it"
+        )
+    if options.failure and not any(isinstance(s, model.Allowables) for s in segments):
+        segments = [strengths_of(plies), *segments]
+    return segments
+
+
+def _doubts_of_tip(
+    options: ImpactOptions, plain: model.Deck, plies: DeckPlies, struck: Sequence[Layer], k: float
+) -> list[str]:
+    """Return a doubt about the patch of a soft sphere, whose contact circle is larger."""
+    patch = plain.last(model.Patch)
+    if not isinstance(options.contact, Sphere) or patch is None:
+        return []
+    radius = patch.radius or RADIUS_PER_THICKNESS[patch.shape] * plies.thickness
+    softest = min(plies.of(layer).ply.e2 for layer in struck)
+    return doubts_of_soft_tip(options.contact, plies.system, radius, k, energy_of(plain), softest)
 
 
 def assemble(

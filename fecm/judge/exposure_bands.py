@@ -199,10 +199,10 @@ def coarse_mesh_note(mesh: LoadMesh, shown: Callable[[float], str]) -> str:
     --------
     >>> coarse_mesh_note(LoadMesh(1.0, True, False, 30.0, 1.1), "{:.3g} R".format)
     'exposures at the load are not bounded: the elements there do not have nine nodes; compare \
-them with those of a finer mesh (fecm check --mesh-error)'
+them with a finer mesh (fecm check --mesh-error)'
     """
     band = "have a wide band" if mesh.is_measured else "are not bounded"
-    compare = "compare them with those of a finer mesh (fecm check --mesh-error)"
+    compare = "compare them with a finer mesh (fecm check --mesh-error)"
     radius = shown(1.0)
     if not mesh.nine_nodes:
         why = f"the elements there do not have nine nodes; {compare}"

@@ -49,7 +49,7 @@ from fecm.problem.parts import build_plate
 from fecm.problem.problem import Problem
 from fecm.problem.refine import refined_deck
 from fecm.problem.symmetry import symmetry_lines
-from fecm.simulation.job import ENOUGH
+from fecm.simulation.run import ENOUGH
 from fecm.sweeps.responses import plate_response
 
 SAME = 1e-9  # relative difference that is rounding, of stiffnesses and rows

@@ -137,10 +137,10 @@ def _equilibria(plate: PlateModel, load: Floats, step: float) -> Iterator[_Point
     path = _Path(plate, load)
     u, force, deflection, step_size = np.zeros(plate.neq), 0.0, 0.0, step
     compliant, turn = path.compliant(u), np.zeros(plate.neq)
+    compliance = float(load @ compliant)
+    direction = compliant / compliance  # du/dW
     while True:
-        compliance = float(load @ compliant)
         yield _Point(deflection, force, 1.0 / compliance)
-        direction = compliant / compliance  # du/dW
         step_size = max(step_size, LARGEST_STEP * deflection)
         while (
             result := path.equilibrium(u + step_size * (direction + step_size / 2.0 * turn))
@@ -151,9 +151,11 @@ def _equilibria(plate: PlateModel, load: Floats, step: float) -> Iterator[_Point
             if step_size < SMALLEST_STEP * (step + deflection):
                 raise ConvergenceError(f"no equilibrium beyond the deflection {deflection:.6g}")
         u, deflection = result, deflection + step_size
-        compliant = path.compliant(u, compliant)
-        force = float(compliant @ path.internal(u)) / float(load @ compliant)
-        turn = (compliant / float(load @ compliant) - direction) / step_size  # d2u/dW2
+        compliant, before = path.compliant(u, compliant), direction
+        compliance = float(load @ compliant)
+        force = float(compliant @ path.internal(u)) / compliance
+        direction = compliant / compliance
+        turn = (direction - before) / step_size  # d2u/dW2
 
 
 class _Update(NamedTuple):

@@ -5,14 +5,13 @@ from __future__ import annotations
 import contextlib
 import math
 import shutil
-import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from fecm._errors import FecmError, OptionsError, warn
+from fecm._errors import OptionsError, warn
 from fecm._files import OutputError, check_outputs, open_for_writing
 from fecm._machine import format_bytes
 from fecm._options import documented, option, with_parameters_of
@@ -44,12 +43,10 @@ from fecm.problem.memory import check_run_memory, needed_bytes
 from fecm.problem.problem import Problem
 from fecm.results.result import Result, load
 from fecm.results.sinks import MemorySink
-from fecm.simulation.run import run_program, simulate
-from fecm.simulation.simulation import Observer, Simulation
+from fecm.simulation.run import run_program, seconds_of_steps, simulate
+from fecm.simulation.simulation import Simulation
 
 Solver = Literal["auto", "kernels", "numpy", "csr"]
-
-ENOUGH = 0.2  # seconds of steps that show what a step costs
 
 
 class Price(NamedTuple):
@@ -555,36 +552,6 @@ def _observer(watch: Watch, problem: Problem) -> Callable[[Simulation], None]:
             raise StoppedError(f"stopped after step {step}")
 
     return on_step
-
-
-class _EnoughError(Exception):
-    """The steps so far show how long a step takes."""
-
-
-def seconds_of_steps(start: Callable[[Observer], Simulation]) -> tuple[float, float]:
-    """Return the seconds of a run before its steps, and of a step, on this machine.
-
-    `start` returns the simulation with an observer. Its first steps are timed; they store rows as
-    often as the whole run does. Both values are NaN if these steps fail.
-    """
-    done, took = 0, 0.0
-    begin = time.perf_counter()
-
-    def look(simulation: Simulation) -> None:
-        nonlocal done, took
-        done, took = simulation.state.plate.step, time.perf_counter() - first
-        if took >= ENOUGH:
-            raise _EnoughError
-
-    try:
-        simulation = start(look)
-        first = time.perf_counter()
-        with contextlib.suppress(_EnoughError):
-            run_program(simulation)
-            done, took = simulation.state.plate.step, time.perf_counter() - first
-    except (FecmError, ArithmeticError):
-        return math.nan, math.nan
-    return first - begin, took / max(1, done)
 
 
 @with_parameters_of(Run)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+import math
+import time
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from fecm._errors import FecmError
 from fecm.deck.model import Cure, Deck, Material
 from fecm.deck.units import unit_names
 from fecm.listing.slips import mode_of
@@ -28,6 +32,8 @@ from fecm.simulation.macros import STORING, bind, bind_loop
 from fecm.simulation.notes import judge_run
 from fecm.simulation.simulation import Observer, Simulation
 from fecm.simulation.state import cause_of_divergence
+
+ENOUGH = 0.2  # seconds of steps that show what a step costs
 
 
 def simulate(
@@ -171,3 +177,33 @@ def _threshold_attributes(threshold: Threshold, crossing: float, result: Result)
         "interfaces": threshold.interfaces,
         "band": np.array(threshold.band),
     }
+
+
+class _EnoughError(Exception):
+    """The steps so far show how long a step takes."""
+
+
+def seconds_of_steps(start: Callable[[Observer], Simulation]) -> tuple[float, float]:
+    """Return the seconds of a run before its steps, and of a step, on this machine.
+
+    `start` returns the simulation with an observer. Its first steps are timed; they store rows as
+    often as the whole run does. Both values are NaN if these steps fail.
+    """
+    done, took = 0, 0.0
+    begin = time.perf_counter()
+
+    def look(simulation: Simulation) -> None:
+        nonlocal done, took
+        done, took = simulation.state.plate.step, time.perf_counter() - first
+        if took >= ENOUGH:
+            raise _EnoughError
+
+    try:
+        simulation = start(look)
+        first = time.perf_counter()
+        with contextlib.suppress(_EnoughError):
+            run_program(simulation)
+            done, took = simulation.state.plate.step, time.perf_counter() - first
+    except (FecmError, ArithmeticError):
+        return math.nan, math.nan
+    return first - begin, took / max(1, done)

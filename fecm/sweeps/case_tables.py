@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecm._errors import StudyError, did_you_mean
 from fecm._measured_tables import MeasuredTable, column_head, plain_unit, read_table
@@ -30,20 +29,10 @@ from fecm.authoring.values import (
     without_unit,
 )
 from fecm.deck.quantities import is_number, text_of
-from fecm.deck.units import MASS, VELOCITY, in_si, unit_in_si, unit_of, units_of
+from fecm.deck.units import in_si, unit_in_si, unit_of, units_of
+from fecm.sweeps.outcome import CONVERTED, MEASURED, MeasuredColumn
 
-MEASURED = "measured_"  # before the names of measured columns
 MISSPELT = 0.75  # similarity to the name of a value from which a column is taken as misspelt
-# Dimensions of measured columns that are converted.
-CONVERTED = ("force", "length", "time", "force*length", VELOCITY, MASS)
-
-
-class MeasuredColumn(NamedTuple):
-    """Column of a table of cases that is not varied, such as a measured peak force."""
-
-    values: NDArray[Any]  # (cases,): numbers, NaN in empty fields, or texts
-    unit: str  # that of the deck if the column could be converted; empty if it is unknown
-    dimension: str  # empty if the unit is not converted
 
 
 class TableOfCases(NamedTuple):

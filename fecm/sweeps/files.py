@@ -18,9 +18,8 @@ from fecm.results import schema
 from fecm.results.groups import ExportError
 from fecm.results.metrics import VERDICTS
 from fecm.sweeps import reduced
-from fecm.sweeps.case_tables import CONVERTED, MEASURED
 from fecm.sweeps.distributions import CustomDistribution, ValueDistribution
-from fecm.sweeps.outcome import Column, Forces
+from fecm.sweeps.outcome import CONVERTED, MEASURED, Column, Forces
 from fecm.sweeps.random import DESIGNS, Design, correlation_of
 from fecm.sweeps.statistics import (
     INTERVAL_ENDS,

@@ -30,7 +30,6 @@ from fecm.problem.problem import Problem
 from fecm.simulation.job import Price, ProblemRun
 from fecm.sweeps.case_tables import (
     CaseTable,
-    MeasuredColumn,
     index_of,
     table_of_cases,
     texts_of,
@@ -49,7 +48,7 @@ from fecm.sweeps.execute import LOST, Done, Means, SchedulerError, carry_out_pla
 from fecm.sweeps.files import write_sweep
 from fecm.sweeps.in_full import built, case_deck
 from fecm.sweeps.limits import Limit, parse_exceed
-from fecm.sweeps.outcome import Outcome, Status
+from fecm.sweeps.outcome import MeasuredColumn, Outcome, Status
 from fecm.sweeps.partial_results import PartialResults
 from fecm.sweeps.plan import plan
 from fecm.sweeps.price import output_bytes

@@ -1,22 +1,34 @@
-"""Outcomes of cases: columns and contact forces; and the protocol of back ends."""
+"""Outcomes of cases: columns, measured columns and forces; and the protocol of back ends."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
+from fecm.deck.units import MASS, VELOCITY
 from fecm.judge.validity import FAILED, VALID
 from fecm.results.metrics import COLUMNS, SUMMARY, Metrics
 from fecm.sweeps.impact_columns import Impacts
 
 Column = NDArray[Any]  # of numbers or of texts
 Forces = tuple[Sequence[int], Floats | None]  # of cases, with contact forces (cases, steps)
+MEASURED = "measured_"  # before the names of measured columns
+# Dimensions of measured columns that are converted.
+CONVERTED = ("force", "length", "time", "force*length", VELOCITY, MASS)
+
+
+class MeasuredColumn(NamedTuple):
+    """Column of a table of cases that is not varied, such as a measured peak force."""
+
+    values: NDArray[Any]  # (cases,): numbers, NaN in empty fields, or texts
+    unit: str  # the deck's unit of a converted column, else the stated one; empty if unknown
+    dimension: str  # empty if the unit is not converted
 
 
 class Status(StrEnum):

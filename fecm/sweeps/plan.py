@@ -20,9 +20,9 @@ from fecm.mechanics.own_law import law_name
 from fecm.problem.problem import Problem
 from fecm.results.metrics import COLUMNS, FOUND, GAGE, SUMMARY
 from fecm.results.metrics import THRESHOLD as OF_THRESHOLD
-from fecm.sweeps.case_tables import MeasuredColumn
 from fecm.sweeps.limits import THRESHOLD, Limit, check_limits
 from fecm.sweeps.methods import method_of
+from fecm.sweeps.outcome import MeasuredColumn
 from fecm.sweeps.random import Design
 from fecm.sweeps.search import Search, Sought, Until, search_of
 from fecm.sweeps.task import (

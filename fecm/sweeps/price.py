@@ -15,7 +15,7 @@ from fecm.authoring.values import REFINE
 from fecm.problem.problem import Problem
 from fecm.results.metrics import SUMMARY
 from fecm.results.sinks import MemorySink
-from fecm.simulation.job import seconds_of_steps
+from fecm.simulation.run import seconds_of_steps
 from fecm.sweeps.in_full import motion, problem_of_case
 from fecm.sweeps.search import USUAL
 from fecm.sweeps.task import WORTH_WORKERS, Plan, Settings, Task, run_task, tasks

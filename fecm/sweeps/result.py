@@ -23,9 +23,8 @@ from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VERD
 from fecm.results.pictures import SweepKind, plot_results
 from fecm.results.written import Reported, Saved
 from fecm.sweeps import reduced as reduced_check
-from fecm.sweeps.case_tables import MEASURED
 from fecm.sweeps.files import FORCE, random_of, save_sweep, sweep_csv_lines
-from fecm.sweeps.outcome import About, Column, Outcome
+from fecm.sweeps.outcome import MEASURED, About, Column, Outcome
 from fecm.sweeps.reduced import ReducedModel
 from fecm.sweeps.statistics import evaluate
 from fecm.sweeps.stored import StoredSweep

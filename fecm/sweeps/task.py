@@ -26,9 +26,8 @@ from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import law_name
 from fecm.problem.problem import Problem
 from fecm.results.result import Result
-from fecm.sweeps.case_tables import MeasuredColumn
 from fecm.sweeps.limits import Limit
-from fecm.sweeps.outcome import Outcome, merge
+from fecm.sweeps.outcome import MeasuredColumn, Outcome, merge
 from fecm.sweeps.random import Design
 from fecm.sweeps.search import Search
 

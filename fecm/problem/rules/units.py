@@ -71,11 +71,11 @@ REAL = {
 }
 # E1, in Pa, from which plies have technical fibres; wood and foam are lighter than these.
 STIFF = 20e9
-# Density in kg/m^3 and E1 in Pa of plies in which E2 of about 1 GPa is that of another unit. Plies
+# Density in kg/m^3 and E1 in Pa of plies in which an E2 of about 1 GPa is in another unit. Plies
 # of polyethylene and of flax are lighter. Soft matrices with carbon fibres have a larger E1.
 HEAVY = 1350.0
 STIFFEST_IN_KSI = 70e9
-SOFTEST_IN_KSI = 0.6e9  # E2, Pa; a smaller one is that of rubber
+SOFTEST_IN_KSI = 0.6e9  # E2, Pa; rubber has a smaller E2
 # Names that are not units of length, force or time.
 OTHERS = {
     "mass": (*MASSES, "ton", "lbm", "slug"),
