@@ -11,6 +11,7 @@ import fecm
 from fecm import Result
 from fecm.deck.model import Deck, Forces, Impact, NodeValues
 from fecm.mechanics import stiffness_product
+from fecm.mechanics.solutions import Tangent, tangent_stiffness
 from fecm.mechanics.stiffness_product import ElementProduct, Workers, stiffness_operator
 from fecm.mechanics.symmetry import SymmetryReduction, symmetry_reduction
 from fecm.problem.parts import build_plate
@@ -165,3 +166,41 @@ def test_any_number_of_threads_gives_the_same_forces_to_the_last_bit(
     assert len(alone._domains) == 8
     np.testing.assert_array_equal(shared(u), alone(u))
     np.testing.assert_allclose(alone(u), plate.stiffness @ u, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("data", "pins"), [(SYMMETRIC, 0), (UNSYMMETRIC, 1)], ids=["bending", "coupled"]
+)
+def test_the_static_displacement_of_half_a_plate_is_the_one_of_the_whole_plate(
+    data: str, pins: int
+) -> None:
+    deck = fecm.read_one(small(mesh=FREE_IN_PLANE, data=data))
+    plate, contact = build_plate(deck, fecm.problem.generate.generate(deck)), unit(MIDDLE)
+    half = symmetry_reduction(plate, contact)
+    tangent = Tangent(plate, reduction=half)
+    # The half turn prevents the translations in the plane, but not the rotation.
+    assert len(tangent.pins) == pins
+    actual = half.field(tangent.solve(half.gather(contact)))
+    free = plate.mesh.equations > 0
+    expected = np.zeros(free.shape)
+    expected[free] = Tangent(plate).solve(contact[free])
+    # Rigid motions in the plane are arbitrary, those of w and of the rotations are not.
+    assert np.abs(actual - expected)[:, 2:].max() < 1e-12 * np.abs(expected).max()
+    residual = plate.internal_forces(actual)[free] - contact[free]
+    assert np.abs(residual).max() < 1e-12
+
+
+def test_the_tangent_of_half_a_stretched_plate_has_the_forces_of_the_whole_one() -> None:
+    text = small(mesh=FREE_IN_PLANE, data=UNSYMMETRIC)
+    deck = fecm.read_one(text)
+    plate = replace(build_plate(deck, fecm.problem.generate.generate(deck)), nonlinear=True)
+    half = symmetry_reduction(plate, unit(MIDDLE))
+    free = plate.mesh.equations > 0
+    generator = np.random.default_rng(5)
+    u, v = (0.1 * generator.standard_normal(half.count) for _ in range(2))
+    field, change = half.field(u), half.field(v)[free]
+    whole = tangent_stiffness(plate, field) @ change
+    of_all = np.zeros(free.shape)
+    of_all[free] = whole
+    reduced = tangent_stiffness(plate, field, half) @ v
+    assert np.abs(reduced - half.gather(of_all)).max() < 1e-12 * np.abs(reduced).max()

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecm._errors import FecmError
 from fecm._machine import require_memory
@@ -179,17 +180,14 @@ class PlateModel:
         return self._numbers[family.nodes].reshape(len(family.rows), -1)
 
     def _element_matrices(
-        self, matrices_of: MatricesOf, *, congruent: bool = True
+        self, matrices_of: MatricesOf, weights: NDArray[np.int_] | None = None
     ) -> Iterator[tuple[Indices, Floats]]:
-        """Yield dofs (ne, n) and matrices (ne, n, n) of all elements, block by block.
-
-        With `congruent`, congruent elements share a matrix.  A matrix that depends on the
-        displacement can't be shared.
-        """
+        """Yield dofs (ne, n) and matrices (ne, n, n) of elements, block by block."""
         for family in self.families:
-            if not congruent:
-                for part in family.blocks(BLOCK):
-                    yield self._dofs(part), matrices_of(part)
+            if weights is not None:
+                represented = family.take(np.flatnonzero(weights[family.rows]))
+                for part in represented.blocks(BLOCK):
+                    yield self._dofs(part), weights[part.rows, None, None] * matrices_of(part)
                 continue
             congruence = family.congruence
             for start in range(0, len(family.rows), BLOCK):
@@ -203,17 +201,20 @@ class PlateModel:
         """Number of entries of all element matrices."""
         return sum(len(f.nodes) * (NDOF * f.nodes.shape[1]) ** 2 for f in self.families)
 
-    def assembled(self, matrices_of: MatricesOf, *, congruent: bool = True) -> sparse.csr_array:
+    def assembled(
+        self, matrices_of: MatricesOf, weights: NDArray[np.int_] | None = None
+    ) -> sparse.csr_array:
         """Assemble a matrix (neq, neq + restrained); columns of restrained dofs come last.
 
-        Congruent elements share a matrix if `congruent` is true.
+        Congruent elements share a matrix.  With `weights` (numel,), the number of elements that
+        each element represents, every element has its own: it may depend on the displacement.
         """
         from scipy import sparse  # 0.16 s, which most runs don't need
 
         neq, ndof = self.neq, self._numbers.size
         require_memory(ASSEMBLED * self.entries, "to assemble the plate's matrices")
         total = sparse.csr_array((neq, ndof))
-        for dofs, matrices in self._element_matrices(matrices_of, congruent=congruent):
+        for dofs, matrices in self._element_matrices(matrices_of, weights):
             rows = np.broadcast_to(dofs[:, :, None], matrices.shape)
             columns = np.broadcast_to(dofs[:, None, :], matrices.shape)
             stored = (rows < neq) & (matrices != 0.0)

@@ -26,16 +26,17 @@ from fecm.mechanics.membrane import MembraneForces
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.roots import root
 from fecm.mechanics.solutions import ConvergenceError, Tangent
+from fecm.mechanics.symmetry import symmetry_reduction
 
-# The iterations end at this change, relative to the displacement.
-CLOSE = 1.0e-8
+# The iterations end at this change, relative to the displacement: force and work have its square.
+CLOSE = 1.0e-5
 MOST_ITERATIONS = 30
 # The iterations fail beyond this relative change.  The first change is the whole displacement.
 MOST_CHANGE = 2.0
 # Conjugate gradients end at this residual, relative to the load: the compliance has its square.
 # A tangent that needs more products is factorised anew.
-CLOSE_DIRECTION = 1.0e-5
-MOST_PRODUCTS = 10
+CLOSE_DIRECTION = 1.0e-4
+MOST_PRODUCTS = 15
 DIFFERENCE = 1.0e-4  # of two displacements whose forces give a product, relative to them
 MOST_STEPS = 200
 # Steps relative to the deflection.  Steps near 0 are larger.
@@ -107,8 +108,7 @@ def static_curve(
     """
     points: list[_Point] = []
     works = [0.0]
-    load = contact[plate.mesh.equations > 0]
-    for point in islice(_equilibria(plate, load, step), MOST_STEPS + 1):
+    for point in islice(_equilibria(plate, contact, step), MOST_STEPS + 1):
         points.append(point)
         if len(points) == 1:
             continue
@@ -132,11 +132,13 @@ class _Point(NamedTuple):
     stiffness: float
 
 
-def _equilibria(plate: PlateModel, load: Floats, step: float) -> Iterator[_Point]:
+def _equilibria(plate: PlateModel, contact: Floats, step: float) -> Iterator[_Point]:
     """Yield equilibria without end, starting at rest."""
-    path = _Path(plate, load)
-    u, force, deflection, step_size = np.zeros(plate.neq), 0.0, 0.0, step
-    compliant, turn = path.compliant(u), np.zeros(plate.neq)
+    path = _Path(plate, contact)
+    load = path.load
+    u, turn = np.zeros((2, len(load)))
+    force, deflection, step_size = 0.0, 0.0, step
+    compliant = path.compliant(u)
     compliance = float(load @ compliant)
     direction = compliant / compliance  # du/dW
     while True:
@@ -159,7 +161,7 @@ def _equilibria(plate: PlateModel, load: Floats, step: float) -> Iterator[_Point
 
 
 class _Update(NamedTuple):
-    """Change of the displacement and of the internal forces, (neq,), and their product."""
+    """Change of the displacement and of the internal forces, (n,), and their product."""
 
     change: Floats
     force: Floats
@@ -169,24 +171,22 @@ class _Update(NamedTuple):
 class _Path:
     """Equilibria of a nonlinear plate; several of them share the factors of one tangent.
 
-    Displacements, (neq,), have the deflection W = P u under the contact load.
+    Displacements, (n,), are those of the independent dofs of the plate: half of them if a half turn
+    maps plate and load onto themselves.  They have the deflection W = P u under the contact load P.
     """
 
-    def __init__(self, plate: PlateModel, load: Floats) -> None:
-        self._plate, self._load = plate, load
-        self._free = plate.mesh.equations > 0
-        self._membrane = MembraneForces(plate)
-        self._factorise(np.zeros(plate.neq))
-
-    def _field(self, u: Floats) -> Floats:
-        field = np.zeros(self._free.shape)
-        field[self._free] = u
-        return field
+    def __init__(self, plate: PlateModel, contact: Floats) -> None:
+        self._plate = plate
+        self._reduction = reduction = symmetry_reduction(plate, contact)
+        self.load = reduction.gather(contact)
+        self._stiffness = reduction.reduced(plate.stiffness, plate.mesh.equations > 0)
+        self._membrane = MembraneForces(plate, reduction.weights.astype(float))
+        self._factorise(np.zeros(reduction.count))
 
     def _factorise(self, u: Floats) -> None:
         self._place = u  # displacement of the tangent
-        self._tangent = Tangent(self._plate, self._field(u))
-        self._response = self._tangent.solve(self._load)
+        self._tangent = Tangent(self._plate, self._reduction.field(u), self._reduction)
+        self._response = self._tangent.solve(self.load)
 
     def renewed(self, u: Floats) -> bool:
         """Factorise the tangent about a displacement; return False if it is factorised."""
@@ -195,10 +195,9 @@ class _Path:
         return is_new
 
     def internal(self, u: Floats) -> Floats:
-        """Return the internal forces f(u), (neq,)."""
-        return np.asarray(
-            self._plate.stiffness @ u + self._membrane.forces(self._field(u))[0][self._free]
-        )
+        """Return the internal forces f(u), (n,)."""
+        membrane, _ = self._membrane.forces(self._reduction.field(u))
+        return np.asarray(self._stiffness @ u + self._reduction.gather(membrane))
 
     def equilibrium(self, u: Floats) -> Floats | None:
         """Return the equilibrium of the deflection of a displacement; None without convergence.
@@ -231,7 +230,7 @@ class _Path:
             factors.append(float(update.change @ residual) / update.work)
             residual = residual - factors[-1] * update.force
         change = self._tangent.solve(residual)
-        change -= float(self._load @ change) / float(self._load @ self._response) * self._response
+        change -= float(self.load @ change) / float(self.load @ self._response) * self._response
         for update, factor in zip(updates, reversed(factors), strict=True):
             change += (factor - float(update.force @ change) / update.work) * update.change
         return change
@@ -255,7 +254,7 @@ class _Path:
         K = LinearOperator((len(u), len(u)), matvec=product, dtype=np.float64)
         M = LinearOperator(K.shape, matvec=self._tangent.approximate, dtype=np.float64)
         compliant, failed = cg(
-            K, self._load, start, rtol=CLOSE_DIRECTION, maxiter=MOST_PRODUCTS, M=M
+            K, self.load, start, rtol=CLOSE_DIRECTION, maxiter=MOST_PRODUCTS, M=M
         )
         if failed:
             self._factorise(u)

@@ -16,7 +16,13 @@ from fecm.mechanics.element_matrices import geometric_stiffness
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.membrane import MembraneForces, tangent
 from fecm.mechanics.plate import UNLOADED, PlateModel
-from fecm.mechanics.symmetry import restrain_plane, with_codes
+from fecm.mechanics.symmetry import (
+    SymmetryReduction,
+    restrain_plane,
+    symmetry_reduction,
+    unreduced,
+    with_codes,
+)
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -49,16 +55,22 @@ class ConvergenceError(FecmError, ArithmeticError):
     exit_code = 1
 
 
-def tangent_stiffness(plate: PlateModel, field: Floats | None) -> sparse.csr_array:
-    """Return the stiffness about a displacement field, (numnp, 5), sparse (neq, neq).
+def tangent_stiffness(
+    plate: PlateModel, field: Floats | None, reduction: SymmetryReduction | None = None
+) -> sparse.csr_array:
+    """Return the stiffness about a displacement field, (numnp, 5).
 
-    The stiffness of a linear plate, and at rest (`field` is None), is K.
+    It is sparse, (neq, neq), or that of the independent dofs of a reduction. The stiffness of a
+    linear plate, and at rest (`field` is None), is K.
     """
-    if field is None or not plate.nonlinear:
-        return plate.stiffness
-    current = field
-    added = plate.assembled(lambda block: tangent(plate, block, current), congruent=False)
-    return (plate.stiffness + added[:, : plate.neq]).tocsr()
+    stiffness = plate.stiffness
+    if plate.nonlinear and (current := field) is not None:
+        weights = (reduction or unreduced(plate)).weights
+        added = plate.assembled(lambda block: tangent(plate, block, current), weights)
+        stiffness = (stiffness + added[:, : plate.neq]).tocsr()
+    if reduction is None:
+        return stiffness
+    return reduction.reduced(stiffness, plate.mesh.equations > 0)
 
 
 def _in_plane_motions(plate: PlateModel) -> Floats:
@@ -82,25 +94,31 @@ def rigid_in_plane(plate: PlateModel) -> Floats:
     return np.asarray(fields[plate.mesh.equations > 0].T[free])
 
 
-def in_plane_pins(plate: PlateModel) -> list[int]:
-    """Return the equations, from 0, of the fewest dofs u and v that hold the plate in its plane.
+def in_plane_pins(plate: PlateModel, reduction: SymmetryReduction | None = None) -> list[int]:
+    """Return the fewest independent dofs u and v, from 0, that hold the plate in its plane.
 
-    The list is empty if the supports hold the plate.  A load without resultants in the plane causes
-    no reaction at the pins: they select the rigid motion and change no strain.
+    Without a reduction they are equations.  The list is empty if the supports hold the plate.  A
+    load without resultants in the plane causes no reaction at the pins: they select the rigid
+    motion and change no strain.
     """
-    equations = plate.mesh.equations[:, :2]
-    motions = _in_plane_motions(plate)
-    restrained = motions[equations == 0]
-    gram = restrained.T @ restrained
+    reduction = reduction or unreduced(plate)
+    in_plane = _in_plane_motions(plate)
+    motions = np.zeros((*plate.mesh.equations.shape, 3))
+    motions[:, :2] = in_plane
+    followers = reduction.gather(reduction.sign)
+    allowed = [reduction.field(reduction.gather(m) / followers) for m in np.moveaxis(motions, 2, 0)]
+    prevented = motions - np.stack(allowed, axis=2)
+    prevented = prevented[prevented.any(axis=2)]
+    gram = prevented.T @ prevented
     pins: list[int] = []
     while True:
         values, vectors = np.linalg.eigh(gram)
         if values[0] > NOT_HELD * values[-1]:
             return pins
-        moves = np.where(equations > 0, np.abs(motions @ vectors[:, 0]), -1.0)
+        moves = np.where(reduction.sign[:, :2] != 0.0, np.abs(in_plane @ vectors[:, 0]), -1.0)
         node, dof = np.unravel_index(moves.argmax(), moves.shape)
-        pins.append(int(equations[node, dof]) - 1)
-        gram = gram + np.outer(motions[node, dof], motions[node, dof])
+        pins.append(int(reduction.index[node, dof]))
+        gram = gram + np.outer(in_plane[node, dof], in_plane[node, dof])
 
 
 def factorised(matrix: sparse.csr_array) -> SuperLU:
@@ -128,17 +146,24 @@ def factorised(matrix: sparse.csr_array) -> SuperLU:
 class Tangent:
     """Factorised stiffness about a field.
 
-    Rigid motions in the plane are pinned, so that they need no supports.  Raises
-    SingularStiffnessError if the stiffness is singular.
+    Loads and displacements, (neq,), are those of the independent dofs of a reduction by symmetry,
+    and of all equations without one.  Rigid motions in the plane are pinned, so that they need no
+    supports.  Raises SingularStiffnessError if the stiffness is singular.
     """
 
-    def __init__(self, plate: PlateModel, field: Floats | None = None) -> None:
+    def __init__(
+        self,
+        plate: PlateModel,
+        field: Floats | None = None,
+        reduction: SymmetryReduction | None = None,
+    ) -> None:
         from scipy.sparse import diags_array  # 0.2 s, which most runs don't need
 
-        self._stiffness = pinned = tangent_stiffness(plate, field)
-        self.pins = in_plane_pins(plate)  # equations, from 0, that hold the plate in its plane
+        self._stiffness = pinned = tangent_stiffness(plate, field, reduction)
+        # Independent dofs, from 0, that hold the plate in its plane.
+        self.pins = in_plane_pins(plate, reduction)
         if self.pins:
-            springs = np.zeros(plate.neq)
+            springs = np.zeros(pinned.shape[0])
             springs[self.pins] = pinned.diagonal()[self.pins]
             pinned = pinned + diags_array(springs, format="csr")
         self._factors = factorised(pinned)
@@ -165,19 +190,21 @@ class Tangent:
         return change
 
 
-def compliance(plate: PlateModel, load: Floats) -> float:
+def compliance(plate: PlateModel, contact: Floats) -> float:
     """Return the displacement under a unit force in the direction of the force.
 
-    `load`, (neq,), are the nodal forces of the unit force.  Raises SingularStiffnessError for a
-    plate that is not held.
+    `contact`, (numnp, 5), are the nodal forces of the unit force.  Raises SingularStiffnessError
+    for a plate that is not held.
     """
-    return float(load @ Tangent(plate).solve(load))
+    reduction = symmetry_reduction(plate, contact)
+    load = reduction.gather(contact)
+    return float(load @ Tangent(plate, reduction=reduction).solve(load))
 
 
 def static_stiffness(plate: PlateModel, contact: Floats) -> float:
     """Return force per displacement under nodal loads (numnp, 5); NaN for a plate not held."""
     try:
-        return 1.0 / compliance(plate, contact[plate.mesh.equations > 0])
+        return 1.0 / compliance(plate, contact)
     except SingularStiffnessError:
         return math.nan
 
@@ -198,14 +225,16 @@ def static_support(
     rests = ~free[:, W] & turns[:, W + 1 :].all(axis=1)
     if not rests.any():
         return None
-    field, load = np.zeros(free.shape), contact[free]
+    reduction = symmetry_reduction(plate, contact)
+    load = reduction.gather(contact)
     try:
-        field[free] = Tangent(plate).solve(load)
+        displacement = Tangent(plate, reduction=reduction).solve(load)
     except SingularStiffnessError:
         return None
     # The supports push against the load, and pull in its direction.
+    field = reduction.field(displacement)
     forces = plate.internal_forces(field)[rests, W] * np.sign(contact[:, W].sum())
-    return 1.0 / float(load @ field[free]), float(forces[forces > 0.0].sum())
+    return 1.0 / float(load @ displacement), float(forces[forces > 0.0].sum())
 
 
 def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:
