@@ -95,7 +95,8 @@ class PlotOptions:
     multiple=True,
     metavar="KIND",
     help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a sweep, "
-    "exceedance of a random one; location of a located impact]",
+    "exceedance of a random one, measured of a table with measured results; location of a "
+    "located impact]",
 )
 @option(
     "-o",
@@ -233,10 +234,13 @@ def _usual(first: Result | SweepResult | Location) -> PictureKind:
     if isinstance(first, Result):
         return PictureKind.FORCE
     # 46 ms, which results of runs do not need.
+    from fecm.sweeps.measured import compared_columns
     from fecm.sweeps.result import SweepResult
 
     if isinstance(first, SweepResult):
-        return PictureKind.EXCEEDANCE if first.random else PictureKind.MAP
+        if first.random:
+            return PictureKind.EXCEEDANCE
+        return PictureKind.MEASURED if compared_columns(first) else PictureKind.MAP
     return PictureKind.LOCATION
 
 

@@ -21,6 +21,7 @@ CONTENTS = {
     "calibration-test.csv": "a calibration of a transducer: time, V_F, V_a",
     "pulse.csv": "a force on a rod: time, force",
     "cases.csv": "cases of a sweep of impact-patch: velocity, k, layup",
+    "tests.csv": "tests of drop-weight: specimen, energy, measured peak force and contact time",
 }
 
 

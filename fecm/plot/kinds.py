@@ -58,6 +58,7 @@ class PictureKind(StrEnum):
     EXCEEDANCE = auto()
     SENSITIVITY = auto()
     SCATTER = auto()
+    MEASURED = auto()
     LOCATION = auto()
 
 
@@ -120,6 +121,9 @@ KINDS: dict[str, Drawing] = {
     ),
     PictureKind.SCATTER: Drawing(
         "random_sweep:scatter", Shows.SWEEP, "a quantity over the random values"
+    ),
+    PictureKind.MEASURED: Drawing(
+        "measured:measured", Shows.SWEEP, "computed over measured values of a table of tests"
     ),
     PictureKind.LOCATION: Drawing(
         "location:location", Shows.LOCATION, "place, force and strains that locate found"

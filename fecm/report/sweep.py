@@ -28,7 +28,9 @@ from fecm.report.content import (
     share,
     worst,
 )
+from fecm.report.measured import tests
 from fecm.results.metrics import RATIO, VERDICTS, described
+from fecm.sweeps.measured import comparisons, ratios_in_words
 from fecm.sweeps.random import Design
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.statistics import QUANTILES, RandomResult
@@ -54,6 +56,7 @@ def sweep_page(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Rep
             ("Trust", [Judgements(tuple(judged)), *note_list(sweep.notes, "Notes of the sweep")]),
             ("Varied values", _varied(sweep)),
             ("Results", [*_extremes(sweep), *_convergence(sweep), *_reduced(sweep), *drawn]),
+            ("Tests", tests(name, sweep)),
             ("Pictures", _pictures(name, sweep)),
             ("Provenance", _provenance(name, sweep, digests)),
         ]
@@ -89,6 +92,9 @@ def _sentences(sweep: SweepResult) -> Iterator[str]:
             else ""
         )
         yield f"{what.replace('_', ' ').capitalize()}: {' to '.join(ends)}{where}."
+    for compared in comparisons(sweep):
+        text = ratios_in_words(compared)
+        yield f"{compared.name.replace('_', ' ').capitalize()} of the tests: {text}."
     if text := threshold_text(sweep):
         yield f"Delamination: {text}."
 

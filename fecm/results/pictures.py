@@ -25,8 +25,8 @@ RunKind = Literal[
     "mesh",
     "animation",
 ]
-# Kinds of pictures of a sweep; all except map are for random sweeps.
-SweepKind = Literal["map", "exceedance", "sensitivity", "scatter"]
+# Kinds of pictures of a sweep; exceedance, sensitivity and scatter are for random sweeps.
+SweepKind = Literal["map", "exceedance", "sensitivity", "scatter", "measured"]
 
 
 def plot_results(

@@ -24,6 +24,7 @@ from fecm.results.pictures import SweepKind, plot_results
 from fecm.results.written import Reported, Saved
 from fecm.sweeps import reduced as reduced_check
 from fecm.sweeps.files import FORCE, random_of, save_sweep, sweep_csv_lines
+from fecm.sweeps.measured import CaseComparison, compare_cases
 from fecm.sweeps.outcome import MEASURED, About, Column, Outcome
 from fecm.sweeps.reduced import ReducedModel
 from fecm.sweeps.statistics import evaluate
@@ -226,6 +227,38 @@ class SweepResult(StoredSweep, Saved, Reported):
         with open_for_writing(Path(path), overwrite=overwrite) as file:
             file.writelines(lines)
 
+    def compare(self, name: str = "") -> CaseComparison:
+        """Compare a result of every case with the measured column of the table of cases.
+
+        Parameters
+        ----------
+        name : str
+            Name in the summary, such as ``"peak_force"``, whose measured column is named after it,
+            as in ``measured_peak_force``; by default the first that has one.
+
+        Returns
+        -------
+        CaseComparison
+            Both columns, their ratios, bias and rms; ``str()`` says them in words.
+
+        Raises
+        ------
+        StudyError
+            If there is no such measured column, or it is in another unit.
+
+        Examples
+        --------
+        >>> import fecm
+        >>> tests = [
+        ...     {"velocity": 50.0, "measured peak_force": 21.0},
+        ...     {"velocity": 115.0, "measured peak_force": 50.0},
+        ... ]
+        >>> result = fecm.sweep("decks/appendix.inp", cases=tests)
+        >>> result.compare("peak_force").measured
+        array([21., 50.])
+        """
+        return compare_cases(self, name)
+
     def plot(
         self,
         kind: SweepKind = "map",
@@ -241,8 +274,9 @@ class SweepResult(StoredSweep, Saved, Reported):
 
         Parameters
         ----------
-        kind : {"map", "exceedance", "sensitivity", "scatter"}
-            Kind of picture; all except map are for random sweeps.
+        kind : {"map", "exceedance", "sensitivity", "scatter", "measured"}
+            Kind of picture; exceedance, sensitivity and scatter are for random sweeps, measured is
+            for tables of cases with measured columns.
         path : str or Path, optional
             File to write instead, as ``fecm plot`` does.  The suffix selects the format.
         quantity : str

@@ -24,6 +24,7 @@ from fecm.problem.symmetry import symmetry_of
 from fecm.results.metrics import FACTOR, FOUND_BAND, RATIO, THRESHOLD_FORCE
 from fecm.results.stored import whole_plate
 from fecm.sweeps.limits import THRESHOLD
+from fecm.sweeps.measured import comparisons
 from fecm.sweeps.outcome import Column
 from fecm.sweeps.random import pairs_of
 from fecm.sweeps.statistics import QUANTILES, RandomResult
@@ -51,6 +52,7 @@ def sweep_rows(result: StoredSweep) -> list[Row]:
         rows.append(("contact law", f"{result.law}, instead of EXPE"))
     if result.measured:
         rows.append(("measured", f"{', '.join(result.measured)}, which are not varied"))
+        rows += [(compared.name, str(compared)) for compared in comparisons(result)]
     if text := symmetry_text(result):
         rows.append(("symmetry", text))
     rows += [*_extremes(result), *_moved(result)]
