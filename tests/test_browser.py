@@ -27,7 +27,7 @@ KINDS = ("run", "d7136", "runs", "sweep", "random", "fit")
 LARGEST = 1_500_000  # bytes of a page
 AA = 4.5  # contrast of text, WCAG 2.2, success criterion 1.4.3
 A4 = (595.0, 842.0)  # points
-PAPER = (680, 1009)  # pixels of A4 within margins of 15 mm, of which 96 make an inch
+PAPER = (680, 998)  # pixels of A4 within its margins, of which 96 make an inch
 MARKS = re.compile("[●▲■○]")  # before verdicts, drawn by the style
 LONG_TITLE = "<b>" + 300 * "x"
 
@@ -214,6 +214,8 @@ def test_on_paper_no_row_is_cut_and_no_picture(
     )
     printed = pypdf.PdfReader(io.BytesIO(browser.pdf())).pages
     assert len(printed) >= 2
+    for number, sheet in enumerate(printed, start=1):
+        assert sheet.extract_text().startswith(f"{number} of {len(printed)}")
     for sheet in printed:
         assert [float(side) for side in sheet.mediabox[2:]] == pytest.approx(A4, abs=1.0)
     texts = [packed(MARKS.sub("", sheet.extract_text())) for sheet in printed]

@@ -404,6 +404,32 @@ def test_a_fit_has_a_page(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("_undrawn")
+def test_the_head_has_the_particulars_and_the_logo_that_are_given(
+    runs: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "mark.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"/>')
+    title = 'Plate "7" </style> \\'
+    given = {"client": "A & B", "specimen": "117", "date": "28 Nov 2026"}
+    options = [word for name, text in given.items() for word in (f"--{name}", text)]
+    output = ("-o", "page.html", "--title", title, "--logo", "mark.svg")
+    done = call("report", runs / "report.h5", *options, *output, cwd=tmp_path)
+    assert done.exit_code == 0, done.stderr
+    html = (tmp_path / "page.html").read_text("utf-8")
+    shown = read_page(html)
+    assert shown.headings[0] == title
+    assert all(f"{name} {text}" in shown.text for name, text in given.items())
+    (logo,) = (picture for picture in shown.pictures if picture["alt"] == "logo")
+    assert logo["src"].startswith("data:image/svg+xml;base64,")
+    # Only letters and digits are unescaped in the style.
+    assert r"Plate\20 \22 7\22 \20 \3c \2f style\3e \20 \5c " in html
+    result = fecm.load(runs / "report.h5")
+    logo_file = tmp_path / "mark.svg"
+    result.report(tmp_path / "again.html", title=title, logo=logo_file, specimen="117")
+    again = read_page((tmp_path / "again.html").read_text("utf-8"))
+    assert (again.headings[0], again.pictures[0]) == (title, shown.pictures[0])
+
+
+@pytest.mark.usefixtures("_undrawn")
 def test_the_command_writes_the_page_with_the_checksum_of_the_file(
     runs: Path, tmp_path: Path
 ) -> None:
@@ -425,6 +451,8 @@ def test_the_command_writes_the_page_with_the_checksum_of_the_file(
         (["deck.inp"], "deck.inp"),
         (["report.h5", "report.h5"], "given twice"),
         (["report.h5", "-o", "no/page.html"], "there is no folder"),
+        (["report.h5", "--logo", "deck.inp"], "a logo is a picture in .png"),
+        (["report.h5", "--logo", "no.png"], "no.png: the logo can't be read: No such file"),
     ],
 )
 def test_wrong_calls_are_refused_and_nothing_is_written(

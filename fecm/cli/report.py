@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 from click import option
 
 from fecm.cli.common import RefusedError, echo_path
 from fecm.cli.isolation import reads
-from fecm.cli.options import NAMED_PATH, typical
+from fecm.cli.options import NAMED_PATH, GroupedCommand, groups_of, job_options, typical
 from fecm.cli.plot import named, run_or_sweep
 from fecm.report.content import check_page
 from fecm.results.hdf5_reader import read
 from fecm.results.schema import Form
+from fecm.results.written import HEAD, OTHER, PageOptions
 
 
 @click.command(
     "report",
+    cls=GroupedCommand,
+    groups=groups_of(PageOptions, {HEAD: [], OTHER: []}),
     epilog=typical(
         "fecm report impact-patch.h5",
+        'fecm report impact-patch.h5 --client "Example Ltd" --specimen 117 --date 2026-11-28',
         "fecm report thin.h5 thick.h5 -o comparison.html",
     ),
 )
 @click.argument("results", type=NAMED_PATH, nargs=-1, required=True, metavar="RESULT...")
+@job_options(PageOptions, logo={"type": NAMED_PATH})
 @option(
     "-o",
     "--output",
@@ -35,15 +41,21 @@ from fecm.results.schema import Form
 @option("--overwrite", is_flag=True, help="Replace an existing report page.")
 @reads("results")
 def report_command(
-    results: tuple[Path, ...], output: Path | None, opens: bool, overwrite: bool
+    results: tuple[Path, ...],
+    options: dict[str, Any],
+    output: Path | None,
+    opens: bool,
+    overwrite: bool,
 ) -> None:
     """Write a report page about RESULT: of a run, of a sweep, or of several runs side by side.
 
-    The page is self-contained: verdict, range of the model, numbers, pictures, model, checksums
-    and the deck.  It needs no network and no scripts, and prints on A4.
+    The page is self-contained: answers, headline figures, range of the model, numbers, pictures,
+    model, checksums and the deck.  It needs no network and no scripts, and prints on A4.
     """
     path = output or Path(f"{results[0].stem}.html")
-    check_page(path, overwrite, results)
+    page_options = PageOptions(**options)
+    inputs = [*results, *filter(None, [options["logo"]])]
+    check_page(path, overwrite, inputs)
     from fecm.report.report import digest, write_report
 
     paths = named(results)
@@ -51,7 +63,7 @@ def report_command(
         name: run_or_sweep(read(place, Form.RUN, Form.SWEEP)) for name, place in paths.items()
     }
     digests = {name: digest(place) for name, place in paths.items()}
-    write_report(loaded, path, digests, overwrite=overwrite)
+    write_report(loaded, path, digests, page_options, overwrite=overwrite)
     echo_path(path)
     if opens and click.launch(str(path)):
         raise RefusedError(f"{path} is written, but no browser could be started")

@@ -1,7 +1,8 @@
 """Content of a page, and its HTML.
 
-A page consists of sections of tables, judgements, notes, pictures and listings. Numbers keep their
-value beside the text that shows them, so that a program can read them from the page: ``<data
+A page begins with a first sheet: title and particulars, answers, headline figures, and some blocks.
+Sections of tables, judgements, notes, pictures and listings follow. Numbers keep their value beside
+the text that shows them, so that a program can read them from the page: ``<data
 value="16169.7">16170 N</data>``.
 
 The page is one file. It contains style and pictures, fetches nothing and runs no script. Equal
@@ -10,6 +11,7 @@ content gives equal bytes. Jinja2, an optional library, fills the template and e
 
 from __future__ import annotations
 
+import base64
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -25,6 +27,7 @@ from fecm._version import __version__
 from fecm.deck.units import quantity
 from fecm.judge.limits import Judgement, TrustLevel
 from fecm.plot.pictures import require_matplotlib
+from fecm.results.written import PageOptions
 
 UNKNOWN = "–"  # of a value that is not known
 MOST_TEXT = 200_000  # characters of a listing
@@ -75,13 +78,33 @@ class PageSection(NamedTuple):
     blocks: tuple[PageBlock, ...]
 
 
+class Answer(NamedTuple):
+    """Answer to a question, in the verdict."""
+
+    question: str
+    answer: str  # a word or two
+    rest: str = ""
+
+
+class Headline(NamedTuple):
+    """Figure of the first sheet, with what qualifies it."""
+
+    name: str
+    value: Cell
+    remarks: tuple[str, ...] = ()  # lines below the value
+
+
 class ReportPage(NamedTuple):
     """Page about one or more results."""
 
     title: str
-    verdict: tuple[str, ...]  # sentences
+    verdict: tuple[str | Answer, ...]  # answers, and sentences
     level: TrustLevel  # the worst of the page
     sections: tuple[PageSection, ...]
+    headlines: tuple[Headline, ...] = ()
+    first_sheet: tuple[PageBlock, ...] = ()  # below the headlines
+    particulars: tuple[tuple[str, str], ...] = ()  # of the page, by name
+    logo: str = ""  # ``data:`` address
 
 
 def number_with_unit(value: float, unit: str = "", digits: int = DIGITS) -> Cell:
@@ -132,6 +155,49 @@ def worst(judgements: Iterable[Judgement]) -> TrustLevel:
     return next((level for level in order if level in levels), TrustLevel.WITHIN)
 
 
+LOGOS = {
+    ".png": "image/png",
+    ".jpg": "image/jpeg",
+    ".jpeg": "image/jpeg",
+    ".svg": "image/svg+xml",
+}
+MOST_LOGO = 300_000  # bytes
+PARTICULARS = ("author", "client", "project", "specimen", "date")
+
+
+def with_head(page: ReportPage, options: PageOptions) -> ReportPage:
+    """Return a page with the title, the particulars and the logo of the options.
+
+    Raises ReportError if the logo is no picture that a page can contain.
+    """
+    values = [(name, getattr(options, name)) for name in PARTICULARS]
+    return page._replace(
+        title=options.title or page.title,
+        particulars=tuple((name, value) for name, value in values if value),
+        logo=_logo(Path(options.logo)) if options.logo else "",
+    )
+
+
+def _logo(path: Path) -> str:
+    """Return a picture as a ``data:`` address."""
+    kind = LOGOS.get(path.suffix.lower())
+    if kind is None:
+        raise ReportError(f"{path}: a logo is a picture in {', '.join(LOGOS)}")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ReportError(f"{path}: the logo can't be read: {error.strerror}") from None
+    if len(data) > MOST_LOGO:
+        most = f"{MOST_LOGO // 1000} kB"
+        raise ReportError(f"{path}: the logo has {len(data) / 1000:.0f} kB; at most {most} fit")
+    return data_address(data, kind)
+
+
+def data_address(data: bytes, kind: str) -> str:
+    """Return bytes of a media type as a ``data:`` address."""
+    return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
+
+
 MISSING = "report pages need Jinja2: pip install 'fecm[report]'"
 SUFFIXES = (".html", ".htm")
 
@@ -166,6 +232,7 @@ def render(page: ReportPage) -> str:
     )
     environment.filters["repr"] = repr
     environment.filters["kind"] = _kind
+    environment.filters["css"] = _css_text
     template = environment.from_string(room.joinpath("page.html").read_text("utf-8"))
     style = room.joinpath("page.css").read_text("utf-8")
     return template.render(page=page, style=style, version=__version__)
@@ -174,6 +241,12 @@ def render(page: ReportPage) -> str:
 def _kind(block: PageBlock) -> str:
     """Return the name of the macro of a block."""
     return type(block).__name__.removeprefix("Page").lower()
+
+
+def _css_text(text: str) -> str:
+    """Return a text as a string of CSS, in which all but letters and digits are escaped."""
+    letters = (c if c.isascii() and c.isalnum() else f"\\{ord(c):x} " for c in printable(text))
+    return f'"{"".join(letters)}"'
 
 
 def _shown(value: object) -> object:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +17,7 @@ from fecm.deck.units import quantity
 from fecm.plot.kinds import PictureKind, PlotError
 from fecm.plot.pictures import draw
 from fecm.plot.style import RC, panels
-from fecm.report.content import PageBlock, PagePicture
+from fecm.report.content import PageBlock, PagePicture, data_address
 from fecm.results.result import Result
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ def inside(figure: Figure) -> str:
     kind = "image/svg+xml"
     if len(data) > LARGEST:
         data, kind = _bytes(figure, "png"), "image/png"
-    return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
+    return data_address(data, kind)
 
 
 def _bytes(figure: Figure, form: str) -> bytes:

@@ -51,6 +51,7 @@ from fecm.results.summary import (
     threshold_in_words,
     threshold_verdict,
 )
+from fecm.results.written import PageOptions
 
 WORDS = {
     TrustLevel.WITHIN: "All quantities are within the range of the model.",
@@ -59,7 +60,9 @@ WORDS = {
 }
 
 
-def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> ReportPage:
+def run_page(
+    results: Mapping[str, Result], digests: Mapping[str, str], options: PageOptions
+) -> ReportPage:
     """Return the page about the results of one or more runs.
 
     Parameters
@@ -68,6 +71,8 @@ def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> Repor
         Results by name.
     digests : mapping of str to str
         SHA-256 of the files of results, by name; those in memory have none.
+    options : PageOptions
+        Whether the deck is shown in full.
     """
     loaded = {name: deck_problem(result) for name, result in results.items()}
     problems = {name: problem for name, (problem, _) in loaded.items()}

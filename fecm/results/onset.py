@@ -58,7 +58,7 @@ def energy_at_force(stored: Stored, force: float) -> float:
     if share and ratio > MOST_RATIO:
         return math.nan
     plate = (impact_energy(stored) - contact) * _spring_energy(ratio, share / (1.0 - share))
-    return plate + contact * ratio**CONTACT_POWER
+    return plate + contact * math.pow(ratio, CONTACT_POWER)
 
 
 def _spring_energy(ratio: float, membrane: float) -> float:
@@ -67,8 +67,8 @@ def _spring_energy(ratio: float, membrane: float) -> float:
     The energy is relative to the energy at w = 1; m is the membrane's energy over the bending's.
     """
     force = ratio * (1.0 + 2.0 * membrane)
-    w = root(lambda w: w + 2.0 * membrane * w**3 - force, 0.0, max(1.0, force), 1e-12)
-    return (w**2 + membrane * w**4) / (1.0 + membrane)
+    w = root(lambda w: w * (1.0 + 2.0 * membrane * w * w) - force, 0.0, max(1.0, force), 1e-12)
+    return w * w * (1.0 + membrane * w * w) / (1.0 + membrane)
 
 
 def membrane_share(stored: Stored) -> float:
@@ -88,4 +88,4 @@ def membrane_share(stored: Stored) -> float:
     elastic = float(stored["membrane/strain_energy"][row])
     if "membrane/preload_energy" in stored:
         elastic -= float(stored["membrane/preload_energy"][row])
-    return float(stored["membrane/energy"][row]) / elastic if elastic > 0.0 else math.nan
+    return float(stored["membrane/energy"][row] / elastic) if elastic > 0.0 else math.nan

@@ -3,10 +3,43 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from pathlib import Path
 
 from fecm._files import check_outputs
 from fecm._methods import function_of
+from fecm._options import described_by, documented, option
+
+HEAD = "Head of the page"  # group of options
+OTHER = "Other options"
+
+
+@documented
+@dataclass(frozen=True, kw_only=True)
+class PageOptions:
+    """What a page says besides its result.
+
+    Parameters
+    ----------
+    {parameters}
+    """
+
+    title: str | None = option(
+        None, "Title of the page.", default_text="the deck's", group=HEAD, metavar="TEXT"
+    )
+    author: str | None = option(None, "Who made the page.", group=HEAD, metavar="TEXT")
+    client: str | None = option(None, "Who receives it.", group=HEAD, metavar="TEXT")
+    project: str | None = option(None, "Project or order.", group=HEAD, metavar="TEXT")
+    specimen: str | None = option(None, "Specimen of the test.", group=HEAD, metavar="TEXT")
+    date: str | None = option(
+        None, "Date, as it is to be printed; a page has no other.", group=HEAD, metavar="TEXT"
+    )
+    logo: str | Path | None = option(
+        None, "Picture beside the title: .png, .jpg or .svg.", group=HEAD, metavar="FILE"
+    )
+    full_deck: bool = option(
+        False, "Show all cards of the deck, nodes and elements too.", group=OTHER
+    )
 
 
 class Saved(ABC):
@@ -57,11 +90,25 @@ class Reported(ABC):
     def _name(self) -> str:
         """Name of the result on pages and in legends."""
 
-    def report(self, path: str | Path, *, overwrite: bool = False) -> None:
+    @described_by(PageOptions)
+    def report(
+        self,
+        path: str | Path,
+        *,
+        overwrite: bool = False,
+        title: str | None = None,
+        author: str | None = None,
+        client: str | None = None,
+        project: str | None = None,
+        specimen: str | None = None,
+        date: str | None = None,
+        logo: str | Path | None = None,
+        full_deck: bool = False,
+    ) -> None:
         """Write an HTML page to hand on, as ``fecm report`` and ``fecm identify --report`` do.
 
-        The page is one file: verdict, numbers, pictures and deck; of a run also its validity, the
-        model and checksums.
+        The page is one file: answers, headline figures, pictures and deck; of a run also its
+        validity, the model and checksums.
 
         Parameters
         ----------
@@ -69,11 +116,12 @@ class Reported(ABC):
             File to write, ``.html``.
         overwrite : bool
             Replace an existing file.
+        {parameters}
 
         Raises
         ------
         ReportError
-            If the name has another suffix.
+            If the name has another suffix, or the logo is no picture that fits.
         FileExistsError
             If the file exists and may not be replaced.
         ImportError
@@ -81,7 +129,17 @@ class Reported(ABC):
 
         Examples
         --------
-        >>> result.report("impact.html")  # doctest: +SKIP
+        >>> result.report("impact.html", client="Example Ltd", specimen="117")  # doctest: +SKIP
         """
+        options = PageOptions(
+            title=title,
+            author=author,
+            client=client,
+            project=project,
+            specimen=specimen,
+            date=date,
+            logo=logo,
+            full_deck=full_deck,
+        )
         write_report = function_of("Result.report")
-        write_report({self._name: self}, Path(path), overwrite=overwrite)
+        write_report({self._name: self}, Path(path), options=options, overwrite=overwrite)
