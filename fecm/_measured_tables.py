@@ -10,6 +10,7 @@ the line below the names.
 from __future__ import annotations
 
 import csv
+import hashlib
 import math
 import re
 import sys
@@ -25,6 +26,7 @@ import numpy as np
 from fecm._errors import StudyError, warn
 from fecm._inputs import decoded, lines_of, read_input
 from fecm._machine import require_memory
+from fecm._text import printable
 from fecm._typing import Floats
 
 Row = tuple[int, list[str]]  # number of the line, and its fields
@@ -123,6 +125,19 @@ class TableColumn(NamedTuple):
         return DIMENSIONS.get(self.name, "strain" if self.name.startswith("gage ") else "")
 
 
+class Record(NamedTuple):
+    """File of measured values; both texts are empty for values that were given as arrays."""
+
+    file: str = ""  # its name
+    sha256: str = ""  # of its contents
+
+    def __str__(self) -> str:
+        return f"{self.file}, SHA-256 {self.sha256}"
+
+
+IN_MEMORY = Record()
+
+
 class MeasuredTable(NamedTuple):
     """Rows of a file below its names and units. Both are empty if the file has none."""
 
@@ -131,6 +146,7 @@ class MeasuredTable(NamedTuple):
     units: list[str]  # empty texts for columns without unit
     rows: list[Row]
     is_decimal_comma: bool
+    record: Record
 
     @property
     def names(self) -> list[str]:
@@ -548,14 +564,16 @@ def read_table(path: Path, most: int = sys.maxsize) -> MeasuredTable:
     NotEnoughMemoryError if its fields take more memory than is free, OSError if the file can't be
     read.
     """
-    rows, is_decimal_comma = _rows(path, most)
+    data = read_input(path)
+    record = Record(printable(path.name), hashlib.sha256(data).hexdigest())
+    rows, is_decimal_comma = _rows(path, data, most)
     skipped, named, below = _heading(rows)
     if not named:
-        return MeasuredTable(path, (0, []), [], rows, is_decimal_comma)
+        return MeasuredTable(path, (0, []), [], rows, is_decimal_comma, record)
     head, under = rows[skipped], rows[skipped + 1][1] if below else []
     under = [field.strip("()[] ") for field in under] + [""] * len(head[1])
     units = [unit_in(name) or unit for name, unit in zip(head[1], under, strict=False)]
-    return MeasuredTable(path, head, units, rows[skipped + 1 + below :], is_decimal_comma)
+    return MeasuredTable(path, head, units, rows[skipped + 1 + below :], is_decimal_comma, record)
 
 
 def _heading(rows: list[Row]) -> tuple[int, bool, bool]:
@@ -579,9 +597,8 @@ def _heading(rows: list[Row]) -> tuple[int, bool, bool]:
     return first - 1 - below, True, below
 
 
-def _rows(path: Path, most: int) -> tuple[list[Row], bool]:
+def _rows(path: Path, data: bytes, most: int) -> tuple[list[Row], bool]:
     """Return the fields of every line with content, and whether they may have decimal commas."""
-    data = read_input(path)
     line_count = 1 + max(data.count(b"\n"), data.count(b"\r"))
     field_count = line_count + sum(data.count(mark) for mark in (b",", b";", b"\t", b" "))
     needed = LINE_BYTES * line_count + FIELD_BYTES * field_count + COPIES * len(data)

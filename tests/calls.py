@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import hashlib
 import io
 import subprocess
 import sys
@@ -65,6 +66,11 @@ def datasets_of(path: Path) -> list[str]:
     with h5py.File(path) as file:
         file.visititems(visit)
     return paths
+
+
+def record_of(path: Path) -> dict[str, str]:
+    """Name and SHA-256 of a file, as texts for machines name a record."""
+    return {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
 
 
 def program(*arguments: object, cwd: Path, **options: object) -> Done:

@@ -18,7 +18,7 @@ from fecm.deck.model import Indentation
 from fecm.identification.alignment import IdentifyError
 from fecm.plot.histories import force_fit_picture
 from fecm.studies.rod_test.filters import filter_of
-from tests.calls import Done, assert_unusable, call
+from tests.calls import Done, assert_unusable, call, record_of
 from tests.decks import PROGRAM, small
 
 Floats = NDArray[np.float64]
@@ -236,6 +236,8 @@ def test_the_command_prints_values_errors_correlations_and_cards(folder: Path) -
     assert plain["correlation"] == [[1.0]]
     assert plain["converged"] is True
     assert plain["dof"] == plain["points"] - 1
+    assert plain["record"] == record_of(folder / "f.csv")
+    assert plain["record"]["sha256"] in done.stdout
 
 
 def test_what_is_wrong_with_a_table_is_said_with_its_likely_cause(folder: Path) -> None:

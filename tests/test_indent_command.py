@@ -12,7 +12,7 @@ import pytest
 
 from fecm.studies.indentation_test.constants import fit_contact_law
 from fecm.studies.indentation_test.turns import read_test
-from tests.calls import assert_unusable, call
+from tests.calls import assert_unusable, call, record_of
 from tests.decks import LONG
 from tests.indentation_tests import ALPHA_P, S_P, K, Q, make_test, noisy, written
 
@@ -231,6 +231,7 @@ def test_files_of_testing_machines_give_the_same_law(
 def test_a_fit_states_the_units_of_its_card(tmp_path: Path) -> None:
     file = machine(tmp_path / "test.csv", "Stroke (mm),Load (kN)", (MM, KN), ",", ".")
     stdout = call("indent", "fit", file).stdout
+    assert f"record          test.csv, SHA-256 {record_of(file)['sha256']}\n" in stdout
     assert "units           mm, N (the test: mm, kN)\nEXPE\n" in stdout
     stdout = call("indent", "fit", file, "--unit", "in,lbf").stdout
     assert "units           in, lbf (the test: mm, kN)\nEXPE\n 1330000.0" in stdout

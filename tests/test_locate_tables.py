@@ -16,7 +16,7 @@ from fecm._errors import ResultFileError, StudyError
 from fecm.deck.units import unit_names
 from fecm.location.table import strain_table
 from fecm.results.groups import NotStoredError
-from tests.calls import Done, call
+from tests.calls import Done, call, record_of
 from tests.panels import OFF_AXIS, STRUCK, TIME, Floats, panel, scatter, struck, with_gages
 
 NEAR = (40.0, 30.0, 80.0, 65.0)
@@ -325,7 +325,9 @@ def test_the_command_prints_what_python_finds(folder: Path) -> None:
     assert done.stdout.splitlines()[0] in about
     assert "locate/force: fitted force" in about
     assert json.loads(call("info", "located.h5", "--format", "json", cwd=folder).stdout)["units"]
-    assert fecm.load_location(folder / "located.h5").mass == 2e-6
+    stored = fecm.load_location(folder / "located.h5")
+    assert stored.mass == 2e-6
+    assert stored.record._asdict() == again["record"] == record_of(folder / "strains.csv")
 
 
 @pytest.mark.long

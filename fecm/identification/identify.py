@@ -399,6 +399,7 @@ def _identification(
         deck=fitted(model.deck, rounded).deck(),
         notes=(),
         law="" if model.law is None else law_name(model.law),
+        record=measured.record,
     )
     doubts = tuple(filter(None, (fault, *measured.faults, *_doubts(identification, points, model))))
     remark = _points_left_out(identification, measured)

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from fecm._measured_tables import IN_MEMORY, Record
 from fecm._table import Row, ShownNumber, Table, html_table, text_lines
 from fecm._text import FITTED_DIGITS
 from fecm._typing import Floats
@@ -58,6 +59,8 @@ class Identification(Reported):
     law : str
         Name of the contact law that replaced EXPE; empty if none did. The deck has EXPE all the
         same.
+    record : Record
+        Name and SHA-256 (`file`, `sha256`) of the file of the measurement; empty texts for arrays.
     """
 
     values: dict[str, float]
@@ -74,6 +77,7 @@ class Identification(Reported):
     notes: tuple[str, ...]
     doubts: tuple[str, ...] = ()
     law: str = ""
+    record: Record = IN_MEMORY
 
     @property
     def verdict(self) -> Literal["yes", "with doubts", "no"]:
@@ -135,6 +139,7 @@ class Identification(Reported):
         """Return plain values, as printed by ``fecm identify --format json``."""
         return {
             **({"law": self.law} if self.law else {}),
+            "record": self.record._asdict(),
             "values": {
                 name: {"value": value, "error": self.errors[name], "start": self.start[name]}
                 for name, value in self.values.items()
@@ -192,6 +197,8 @@ def _quality(fit: Identification) -> Table:
     ]
     if fit.law:
         rows.append(("law", f"{fit.law}, instead of EXPE"))
+    if fit.record.file:
+        rows.append(("record", str(fit.record)))
     return Table(tuple(rows), title="Fit")
 
 

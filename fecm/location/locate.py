@@ -315,6 +315,7 @@ def _location(
         notes=(),
         accepted=True,
         deck=problem.deck,
+        record=table.record,
     )
 
 

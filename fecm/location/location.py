@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fecm._arrays import read_only
 from fecm._errors import FecmError, OptionsError, ResultFileError
+from fecm._measured_tables import IN_MEMORY, Record
 from fecm._table import Row, Table, html_summary, text_lines
 from fecm._text import FITTED_DIGITS
 from fecm._typing import AnyFile, Bools, Floats
@@ -163,6 +164,9 @@ class Location(Saved):
         Whether the strains determine the place, and the model describes the strains.
     deck : Deck
         The deck of the plate.
+    record : Record
+        Name and SHA-256 (`file`, `sha256`) of the file of the strains; empty texts for arrays, and
+        in files of older versions.
     """
 
     x: float
@@ -200,6 +204,7 @@ class Location(Saved):
     peak_bias: float | None = None
     sd_impulse: float | None = None
     mesh_error: float | None = None
+    record: Record = IN_MEMORY
 
     def __post_init__(self) -> None:
         for name, values in vars(self).items():
@@ -302,6 +307,7 @@ class Location(Saved):
         attributes = {
             "locate": self._place_attributes(),
             "locate/force": self._known_attributes(*OF_FORCE, *OPTIONAL),
+            "locate/strains": self.record._asdict() if self.record.file else {},
         }
         with result_writing(path, schema.Form.LOCATION, overwrite=overwrite) as sink:
             sink.attributes("", self._file_attributes())
@@ -317,6 +323,7 @@ class Location(Saved):
         return {
             **{name: getattr(self, name) for name in IN_JSON},
             "second": None if self.second is None else self.second._asdict(),
+            "record": self.record._asdict(),
             "gages": self.gages.tolist(),
             "gains": self.gains.tolist(),
             "sd_gains": self.sd_gains.tolist(),
@@ -416,6 +423,8 @@ def location_table(location: Location) -> Table:
     if location.sd_gains.any():
         gains = zip(location.gages.tolist(), location.gains, location.sd_gains, strict=True)
         rows += [(f"gain of gage {n}", f"{gain:.4f} ± {sd:.2g}") for n, gain, sd in gains]
+    if location.record.file:
+        rows.append(("record", str(location.record)))
     rows.append(("accepted", "yes" if location.accepted else "no"))
     return Table(tuple(rows), title=location.deck.title or "(no title)")
 
@@ -478,6 +487,7 @@ def location_of(contents: FileContents) -> Location:
     try:
         arrays = _arrays(contents)
         place, force = (contents.groups[name] for name in ("locate", "locate/force"))
+        strains = contents.groups.get("locate/strains", {})
         names = [f"second_{name}" for name in Candidate._fields]
         second = Candidate(*(_number(place, n) for n in names)) if names[0] in place else None
         notes = contents.attributes.get("notes", ())
@@ -494,6 +504,7 @@ def location_of(contents: FileContents) -> Location:
             accepted=bool(place["accepted"]),
             notes=tuple(map(str, notes)) if isinstance(notes, list) else (),
             deck=deck_in(contents.texts.get("deck", "")),
+            record=Record(*(str(strains.get(name, "")) for name in Record._fields)),
         )
     except (KeyError, ValueError, TypeError) as error:
         raise ResultFileError(f"{contents.path}: the location is incomplete ({error})") from None

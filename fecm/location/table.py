@@ -11,9 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._errors import StudyError, warn
-from fecm._measured_tables import MeasuredTable, factor, read_table, same_name, unit_free, unit_in
+from fecm._measured_tables import (
+    IN_MEMORY,
+    MeasuredTable,
+    Record,
+    factor,
+    read_table,
+    same_name,
+    unit_free,
+    unit_in,
+)
 from fecm._record_faults import record_faults
-from fecm._text import printable
 from fecm._typing import Floats
 
 _K = TypeVar("_K")
@@ -35,6 +43,7 @@ class StrainTable(NamedTuple):
     time: Floats  # (points,), increasing
     gages: NDArray[np.int32]  # (gages,): numbers on the cards
     strains: Floats  # (gages, points)
+    record: Record = IN_MEMORY
 
     def faults(self, clock: str) -> list[str]:
         """Describe the faults of the records, for times in a unit, with causes and remedies."""
@@ -178,9 +187,10 @@ def _from_columns(
 
 def _from_file(path: Path, units: Mapping[str, str], numbers: Sequence[int]) -> StrainTable:
     """Read a CSV file with a column per gage, or with a row for every time and gage."""
-    table, name = read_table(path), printable(path.name)
+    table = read_table(path)
+    name = table.record.file
     if all(map(table.has, ("time", "gage", "strain"))):
-        return _from_long(table, name, units, numbers)
+        return _from_long(table, name, units, numbers)._replace(record=table.record)
     width = len(table.rows[0][1]) if table.rows else 0
     heads = table.head[1] or [f"column {n}" for n in range(1, width + 1)]
     has_time = table.has("time") or not table.head[1]
@@ -190,7 +200,7 @@ def _from_file(path: Path, units: Mapping[str, str], numbers: Sequence[int]) -> 
     )
     columns = [clock, *(table.column(f"gage {gage}", place) for place, gage in gages.items())]
     time, *strains = table.values(columns, units, increasing="time")
-    return _as_table(name, time, list(gages.values()), strains)
+    return _as_table(name, time, list(gages.values()), strains)._replace(record=table.record)
 
 
 def _from_long(

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from fecm._errors import StudyError, warn
-from fecm._measured_tables import factor, read_table
+from fecm._measured_tables import IN_MEMORY, Record, factor, read_table
 from fecm._record_faults import record_faults
-from fecm._text import printable
 from fecm._typing import Floats
 from fecm.results.stored import Stored
 
@@ -32,6 +31,7 @@ class Measurement:
     time: Floats  # (points,), increasing
     force: Floats  # (points,)
     faults: tuple[str, ...] = ()  # of the instrument, with causes and remedies
+    record: Record = IN_MEMORY
 
     @property
     def quantity(self) -> str:
@@ -172,7 +172,8 @@ def _from_file(
     column = "transducer" if table.has("transducer") and not table.has("force") else "force"
     columns_found = table.find(("time", column), columns, units)
     time, force = table.values(columns_found, units, stated=stated, increasing="time")
-    return _with_faults(Measurement(printable(path.name), column, time, force), units)
+    measured = Measurement(table.record.file, column, time, force, record=table.record)
+    return _with_faults(measured, units)
 
 
 def _doubt_trigger(stored: Stored, measured: Measurement, clock: Floats) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecm._errors import StudyError, warn
+from fecm._measured_tables import IN_MEMORY, Record
 from fecm._record_faults import record_faults
 from fecm._typing import Floats
 from fecm.authoring.contact import Contact
@@ -39,6 +40,8 @@ class IndentationFit:
         Units of both columns in the file.
     fit : ContactLawFit
         Curves and parameters of the fit, for pictures.
+    record : Record
+        Name and SHA-256 (`file`, `sha256`) of the file of the test; empty texts for arrays.
     """
 
     indentation: Floats
@@ -46,6 +49,7 @@ class IndentationFit:
     units: Mapping[str, str]
     stated: tuple[str, str]
     fit: ContactLawFit
+    record: Record = IN_MEMORY
 
     @property
     def k(self) -> FittedValue:
@@ -114,7 +118,7 @@ class IndentationFit:
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, as printed by `fecm indent fit --format json`."""
         plain = constants.plain(self.fit) | {"notes": list(self.notes)}
-        return {"units": dict(self.units) or None, **plain}
+        return {"record": self.record._asdict(), "units": dict(self.units) or None, **plain}
 
     def __repr__(self) -> str:
         return f"<fecm fit of an indentation test of {len(self.force)} points>"
@@ -126,7 +130,8 @@ class IndentationFit:
         )
         unit_names = f"{', '.join(units)}{stated}" if units else "not named in the test"
         card = constants.card(self.fit)
-        lines = [*constants.fit_lines(self.fit), f"units           {unit_names}"]
+        record = [f"record          {self.record}"] if self.record.file else []
+        lines = [*constants.fit_lines(self.fit), *record, f"units           {unit_names}"]
         return "\n".join([*lines, card] if card else lines)
 
 
@@ -213,7 +218,7 @@ def fit_law(
                 f"compression: a minus before a name or number of `columns` changes the sign"
             )
     fit = fit_contact_law(test.indentation, test.force, retreat=turn, q=q, acr=acr)
-    return IndentationFit(test.indentation, test.force, test.units, test.stated, fit)
+    return IndentationFit(test.indentation, test.force, test.units, test.stated, fit, test.record)
 
 
 def _measured(

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._errors import StudyError
-from fecm._measured_tables import read_table
+from fecm._measured_tables import IN_MEMORY, Record, read_table
 from fecm._typing import Floats
 
 Rows = NDArray[np.int64]  # numbers of points
@@ -225,6 +225,7 @@ class Test(NamedTuple):
     force: Floats  # (rows,)
     units: Mapping[str, str]  # names of the units of length and force; empty if unknown
     stated: tuple[str, str]  # units of both in the file; empty texts if none
+    record: Record = IN_MEMORY
 
 
 def read_test(
@@ -249,7 +250,7 @@ def read_test(
     indentation, force = table.values((length, load), target)
     if names and any(stated):
         stated = (stated[0] or names[0], stated[1] or names[1])
-    return Test(indentation, force, target, stated)
+    return Test(indentation, force, target, stated, table.record)
 
 
 def _consistent_units(length: str, force: str) -> tuple[str, str]:
