@@ -125,8 +125,7 @@ class PlateOptions:
     zones={"type": Parsed(new_values.zone, "X0,Y0,X1,Y1:LAYUP")},
     projectile={
         "type": Parsed(new_values.projectile, "PROJECTILE"),
-        "help": "mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default in lbf, in and s: the "
-        "report's rod]",
+        "help": f"{new_values.PROJECTILE_FORMS}.  [default in lbf, in and s: the report's rod]",
     },
     contact={
         "type": Parsed(new_values.contact, "NAME"),

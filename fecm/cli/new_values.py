@@ -17,21 +17,23 @@ from fecm.deck.catalogue import CONTACTS, NamedContact
 from fecm.deck.layup import parse_plies
 from fecm.deck.macros import RowsOfPlies
 from fecm.deck.model import Ply
-from fecm.mechanics.projectile import RigidMass, Rod
+from fecm.mechanics.projectile import DeckProjectile, RigidMass, Rod
 
 ESTIMATE = "estimate:RADIUS[,ES,NUS]"
 
-PROJECTILES: dict[str, tuple[str, Callable[..., Rod | RigidMass]]] = {
+# Values of each kind of projectile, and what makes it of them.
+PROJECTILES: dict[str, tuple[str, Callable[..., DeckProjectile]]] = {
     "mass": ("M", RigidMass),
     "rod": ("LENGTH,DIAMETER,E,DENSITY", Rod.cylinder),
 }
+PROJECTILE_FORMS = " or ".join(f"{kind}:{form}" for kind, (form, _) in PROJECTILES.items())
 
 
-def projectile(text: str) -> Rod | RigidMass:
-    """Parse a rigid mass or a cylindrical rod."""
+def projectile(text: str) -> DeckProjectile:
+    """Parse a projectile by its kind and its values."""
     kind, _, values = text.partition(":")
     if kind not in PROJECTILES:
-        raise ValueError(f"{text!r} is not mass:M or rod:LENGTH,DIAMETER,E,DENSITY")
+        raise ValueError(f"{text!r} is not {PROJECTILE_FORMS}")
     form, made_of = PROJECTILES[kind]
     return made_of(*list_of(f"{kind}:{form}", Finite(), [form.count(",") + 1])(values))
 

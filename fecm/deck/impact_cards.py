@@ -118,6 +118,15 @@ class Projectile(Segment, keyword="PROJ"):
         "F10 rod's density|density",
     )
 
+    def positive_values(self) -> Iterator[tuple[str, float, str]]:
+        """Yield what must be positive: its name, its value, and its field on the card."""
+        if not self.elements:
+            yield "projectile's mass", self.size, "length or mass"
+            return
+        yield "projectile's length", self.size, "length or mass"
+        yield "rod's modulus", self.modulus, "rod's Young's modulus"
+        yield "rod's density", self.density, "rod's density"
+
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
         """Read the first card and the diameters of a rod."""

@@ -63,13 +63,7 @@ def invalid_projectile(card: model.Projectile) -> Reports:
 
     Remedy: Positive numbers.
     """
-    values = [
-        (f"projectile's {'length' if card.elements else 'mass'}", card.size, "length or mass")
-    ]
-    if card.elements:
-        values.append(("rod's modulus", card.modulus, "rod's Young's modulus"))
-        values.append(("rod's density", card.density, "rod's density"))
-    for what, value, name in values:
+    for what, value, name in card.positive_values():
         if not value > 0.0:
             yield Report(f"The {what} is {value:g}; it must be positive.", card.place(name))
 
