@@ -12,7 +12,7 @@ import pytest
 
 import fecm
 from fecm.deck.units import COEFFICIENT, DENSITY, MASS, MODULUS, TOUGHNESS, VELOCITY, convert
-from fecm.judge import limits
+from fecm.judge import limits, locations
 from fecm.judge.end import ENDS
 from fecm.judge.limits import ModelLimit
 from tests.decks import ROOT
@@ -23,7 +23,6 @@ PACKAGE = ROOT / "fecm"
 NOTES = {
     "simulation/notes.py": ("_numerical",),
     "simulation/macros.py": ("PINNED",),
-    "location/verdict.py": ("_serious", "_remarks"),
     "judge/end.py": ("DECIDING_STEPS",),
     "judge/exposure_bands.py": ("coarse_mesh_note",),
     "judge/validity.py": ("OTHER", "PRELOADED", "UNSAFE", "of_face", "softness"),
@@ -122,8 +121,8 @@ def told(templates: Iterable[str]) -> set[str]:
 
 
 def rows() -> Iterator[str]:
-    """Texts of the rows of limits and ends that runs and sweeps note."""
-    for row in vars(limits).values():
+    """Texts of the rows of limits and ends that runs, sweeps and locations note."""
+    for row in (*vars(limits).values(), *vars(locations).values()):
         if isinstance(row, ModelLimit):
             yield from (row.note, row.case, *([row.remedy] if row.note else []))
     for meaning in ENDS.values():

@@ -46,10 +46,20 @@ from fecm.identification.misfit import (
     proposal,
     sign_runs,
     undescribed,
-    wrong_model,
 )
 from fecm.identification.result import CARDS, Identification
 from fecm.judge.end import PEAK_NOT_REACHED
+from fecm.judge.fits import (
+    AT_BOUND,
+    CORRELATED,
+    DOUBTFUL_RUN,
+    FAILED_RUN,
+    FEW_RUNS,
+    LEFT_OUT,
+    NOT_CONVERGED,
+    SHAPED,
+    UNDESCRIBED,
+)
 from fecm.judge.validity import DOUBTS, OTHER, reasons_of
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import law_name, own_law
@@ -66,8 +76,6 @@ from fecm.sweeps.plan import check_law
 
 FREE = (*CARDS, *OF_RECORD)
 USUAL_EVALUATIONS = 30  # of a fit, each with one force more than there are parameters
-MANY_LOST = 0.05  # share of the contact's points outside the run that makes a doubt of a remark
-CORRELATED = 0.99  # correlation of two parameters above which a note reports it
 UNIT_OFFSET = 0.01  # unit of the offset, over the peak of the deck's run
 
 
@@ -346,7 +354,7 @@ def fit_deck(
     if points is None:
         lag = starts[0] if DELAY in free else 0.0
         if share_lost(measured.force, during_run(measured.time, clock, lag)) <= LOST:
-            raise IdentifyError(wrong_model("the fit shifts the run away from the contact"))
+            raise IdentifyError(UNDESCRIBED.say(why="the fit shifts the run away from the contact"))
         raise StudyError(
             f"{measured.name}: {_explain_points_outside(free, starts[0], width, units)}"
         )
@@ -403,7 +411,7 @@ def _identification(
     )
     doubts = tuple(filter(None, (fault, *measured.faults, *_doubts(identification, points, model))))
     remark = _points_left_out(identification, measured)
-    if remark and points.lost > MANY_LOST:
+    if remark and points.lost > LEFT_OUT.value:
         doubts = (remark, *doubts)
     notes = doubts if not remark or remark in doubts else (*doubts, remark)
     return replace(identification, notes=notes, doubts=doubts)
@@ -454,38 +462,29 @@ def _points_left_out(fit: Identification, measured: Measurement) -> str:
     count = len(measured.time)
     if not (outside := count - len(fit.time)):
         return ""
-    return f"{outside} of {count} points are outside the run of the deck and left out"
+    return LEFT_OUT.say(outside=outside, count=count)
 
 
 def _doubts(fit: Identification, solution: FittedPoints, model: ForceModel) -> Iterator[str]:
     """Yield reasons to doubt the values, from the fit and from the run of the fitted deck."""
     if not fit.converged:
-        yield "the fit has not converged; start from better values in the deck"
+        yield NOT_CONVERGED.say()
     for name, bound in zip(fit.values, solution.active, strict=True):
         if bound:
-            yield f"{name} is at its bound {fit.values[name]:.6g}; its standard error is void"
+            yield AT_BOUND.say(name=name, value=fit.values[name])
     names = list(fit.values)
-    for i, j in zip(*np.nonzero(np.triu(np.abs(fit.correlation) > CORRELATED, 1)), strict=True):
-        text = f"{names[i]} and {names[j]} have the correlation {fit.correlation[i, j]:.4f}"
-        yield f"{text}: their values can hardly be told apart"
+    correlated = np.triu(np.abs(fit.correlation) > CORRELATED.value, 1)
+    for i, j in zip(*np.nonzero(correlated), strict=True):
+        yield CORRELATED.say(first=names[i], second=names[j], correlation=fit.correlation[i, j])
     if has_shape(solution):
-        correlation = neighbour_correlation(fit.residual)
-        text = "the model does not describe the measurement down to its noise"
-        text = f"{text}, and the standard errors are too small"
-        yield f"neighbouring residuals have the correlation {correlation:.2f}: {text}"
+        yield SHAPED.say(correlation=neighbour_correlation(fit.residual))
     elif has_few_sign_runs(solution):
-        rarity = -sign_runs(fit.residual)
-        yield (
-            f"the residual changes its sign too rarely for independent errors ({rarity:.1f} "
-            "standard deviations of a runs test): the model does not describe the measurement down "
-            "to its noise; does the measurement have a filter that --filter does not name?"
-        )
+        yield FEW_RUNS.say(rarity=-sign_runs(fit.residual))
     outcome = model.outcome([strike_of(fit.deck)], judged=True)
     if not outcome.fine[0]:
-        yield f"the run of the fitted deck fails: {outcome.status[0]}"
+        yield FAILED_RUN.say(why=outcome.status[0])
     # The measurement may end in contact. Other limits of the model bias the parameters.
     doubts = [DOUBTS.get(r, OTHER) for r in reasons_of(str(outcome.columns["validity"][0]))]
     limits = [doubt.case for doubt in doubts if doubt != PEAK_NOT_REACHED]
     if limits:
-        meaning = ", ".join(limits)
-        yield f"the run of the fitted deck is {meaning}: the parameters make up for what it lacks"
+        yield DOUBTFUL_RUN.say(doubts=", ".join(limits))

@@ -22,17 +22,21 @@ from fecm.identification.fitting import (
     ForceModel,
     join_names,
 )
+from fecm.judge.fits import (
+    COLOURED,
+    FEW_RUNS,
+    FILTERED,
+    FORCE_WITHOUT_CONTACT,
+    MISSING_PARAMETER,
+    PERHAPS_FILTERED,
+    UNDESCRIBED,
+)
 from fecm.studies.rod_test.filters import Filter, FilterKind
 
-FEW_RUNS = -4.0  # number of sign runs, in standard deviations, below which a note reports it
 RISES = np.geomspace(3e-3, 0.3, 14)  # rise times that are tried, over the time of the contact
 FINER = 7  # rise times around the best one, which are tried next
 CLEARLY = 0.9  # residual with a filter over the residual with delay or offset, for a proposal
-COLOURED = 0.5  # correlation of neighbours above which a residual has a shape
 FAINT = 1e-3  # share of the peak up to which residuals are errors of arithmetic
-# Share of the force's variance in a residual with a shape, above which the model does not describe
-# the force.
-UNDESCRIBED = 0.05
 CERTAIN = 5.0  # standard errors above which a delay, an offset or a filter is not noise
 LIKELY = 4.0  # the same for a note about a filter
 HALF = 0.5  # share of the systematic residual that a proposal must remove
@@ -86,22 +90,15 @@ def undescribed(points: FittedPoints, units: dict[str, str]) -> str:
         return ""
     rms = f"{math.sqrt(points.variance):.3g} {unit_of('force', units)}".rstrip()
     share = 100.0 * math.sqrt(points.variance) / float(np.std(points.force))
-    return wrong_model(
-        f"the rms of the residual, {rms}, is {share:.0f} % of the standard deviation"
-    )
-
-
-def wrong_model(why: str) -> str:
-    """Return a note that the model does not describe the data, and what to check."""
-    hint = "compare supports, laminate, patch, mesh and filter with the test"
-    return f"the model does not describe the data: {why}; {hint}"
+    why = f"the rms of the residual, {rms}, is {share:.0f} % of the standard deviation"
+    return UNDESCRIBED.say(why=why)
 
 
 def _describes(residual: Floats, force: Floats) -> bool:
     """Return whether a fit with this residual describes the force."""
     share = float(residual @ residual) / (len(force) * float(np.var(force)))
     shaped = neighbour_correlation(residual) > COLOURED
-    return share < 1.0 and (share <= UNDESCRIBED or not shaped)
+    return share < 1.0 and (share <= UNDESCRIBED.value or not shaped)
 
 
 # A delay or an offset that was left out -----------------------------------------------------------
@@ -147,13 +144,13 @@ def proposal(
         record_fit and _rms(filter_fit.residual) > CLEARLY * _rms(record_fit.residual)
     ):
         return text, ""
-    seems = (
-        f"the measurement seems to be filtered: with --filter first-order:{sensor.size:.2g} "
-        f"{_format_fall(filter_fit, points.residual, units)}"
+    name, effect = (
+        f"first-order:{sensor.size:.2g}",
+        _format_fall(filter_fit, points.residual, units),
     )
     if filter_fit.explains(points.residual, points.force):
-        return f"{seems}; the values given here are biased", ""
-    return text, f"{seems}, which is more than chance; the values may be biased"
+        return FILTERED.say(filter=name, effect=effect), ""
+    return text, PERHAPS_FILTERED.say(filter=name, effect=effect)
 
 
 def _rms(residual: Floats) -> float:
@@ -185,8 +182,7 @@ def _propose_record_parameter(
             return trial, _format_proposal(trial, before, units)
     if OFFSET in missing and (level := _force_without_contact(model, points)):
         force = f"{level:.3g} {unit_of('force', units)}".rstrip()
-        text = f"fit {OFFSET} too: without contact the measured force is {force}, beyond its noise"
-        return None, text
+        return None, FORCE_WITHOUT_CONTACT.say(name=OFFSET, force=force)
     return None, ""
 
 
@@ -229,7 +225,7 @@ def _find_filter(
 
 def has_few_sign_runs(points: FittedPoints) -> bool:
     """Return whether the residual changes its sign less often than chance explains."""
-    return not _is_negligible(points) and sign_runs(points.residual) < FEW_RUNS
+    return not _is_negligible(points) and -sign_runs(points.residual) > FEW_RUNS.value
 
 
 def _linear(model: ForceModel, points: FittedPoints, names: Sequence[str]) -> LargerFit:
@@ -261,7 +257,7 @@ def _format_proposal(trial: LargerFit, before: Floats, units: dict[str, str]) ->
         for name, value in trial.added.items()
     ]
     effect = f"with {join_names(values)} {_format_fall(trial, before, units)}"
-    return f"fit {join_names(list(trial.added))} too: {effect}; the values given here are biased"
+    return MISSING_PARAMETER.say(names=join_names(list(trial.added)), effect=effect)
 
 
 def _format_fall(trial: LargerFit, before: Floats, units: dict[str, str]) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from fecm.authoring.values import dimension_of
 from fecm.deck.model import Deck, Impact, Indentation, Projectile
 from fecm.deck.units import quantity, readable, unit_names, unit_of
 from fecm.identification.fitting import OF_RECORD
+from fecm.judge.fits import Verdict, verdict_of
 from fecm.results.groups import NotStoredError
 from fecm.results.written import Reported
 
@@ -80,11 +80,9 @@ class Identification(Reported):
     record: Record = IN_MEMORY
 
     @property
-    def verdict(self) -> Literal["yes", "with doubts", "no"]:
+    def verdict(self) -> Verdict:
         """Whether the values are accepted: yes, with doubts (see `doubts`), or no."""
-        if not self.accepted:
-            return "no"
-        return "with doubts" if self.doubts else "yes"
+        return verdict_of(self.doubts, accepted=self.accepted)
 
     @property
     def residual(self) -> Floats:

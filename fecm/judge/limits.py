@@ -7,7 +7,7 @@ level of trust, and for what they say. A row whose cases are judged is in :data:
 from __future__ import annotations
 
 import math
-from enum import StrEnum
+from enum import Enum, StrEnum, auto
 from typing import NamedTuple
 
 from fecm._table import Cell
@@ -39,6 +39,15 @@ class Doubt(NamedTuple):
     level: TrustLevel
 
 
+class Scale(Enum):
+    """What the value of a limit is multiplied by."""
+
+    ONE = auto()
+    LINEAR_PLATE = auto()  # thickness of a plate that is taken as linear
+    INDENTED_PLATE = auto()  # thickness that the indentation is compared with
+    THRESHOLD = auto()  # delamination threshold, force
+
+
 class ModelLimit(NamedTuple):
     """Limit of a quantity, with what is said beyond it.
 
@@ -63,6 +72,8 @@ class ModelLimit(NamedTuple):
         Quantity in the reason of a case, ``symbol > shown``.
     level : TrustLevel
         Trust in a result beyond the limit.
+    scale : Scale
+        What the value is multiplied by.
     """
 
     quantity: str
@@ -74,6 +85,7 @@ class ModelLimit(NamedTuple):
     case: str = ""
     symbol: str = ""
     level: TrustLevel = TrustLevel.DOUBTFUL
+    scale: Scale = Scale.ONE
 
     @property
     def reason(self) -> str:
@@ -125,6 +137,7 @@ def _deflection(ratio: float) -> ModelLimit:
         case="beyond the linear plate",
         symbol="w",
         level=TrustLevel.OUTSIDE,
+        scale=Scale.LINEAR_PLATE,
     )
 
 
@@ -161,6 +174,7 @@ INDENTATION = ModelLimit(
     case="beyond the contact law",
     symbol="indentation",
     level=TrustLevel.OUTSIDE,
+    scale=Scale.INDENTED_PLATE,
 )
 # A search for the velocity that reaches 1 ends a hair above.
 CROSSED = 1.0001
@@ -181,6 +195,7 @@ THRESHOLD = ModelLimit(
     page="the run is elastic above the threshold",
     case="elastic predictions",
     symbol="peak force",
+    scale=Scale.THRESHOLD,
 )
 LIMITS = (
     HELD_DEFLECTION,

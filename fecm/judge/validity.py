@@ -19,11 +19,10 @@ from fecm.judge.end import ENDS, Texts
 from fecm.judge.limits import (
     FREE_DEFLECTION,
     HELD_DEFLECTION,
-    INDENTATION,
     LIMITS,
-    THRESHOLD,
     Doubt,
     ModelLimit,
+    Scale,
     TrustLevel,
 )
 
@@ -226,14 +225,19 @@ class Judge(NamedTuple):
         """Limit of the deflection of a linear plate over its thickness."""
         return DEFLECTION[self.in_plane]
 
-    def largest(self, limit: ModelLimit) -> float:
+    def largest(self, limit: ModelLimit, threshold: Floats | float = np.nan) -> Floats | float:
         """Return the largest value within a limit, in the deck's units.
 
-        A plate that is not taken as linear has no limit of its deflection.
+        A plate that is not taken as linear has no limit of its deflection. `threshold` is the
+        delamination threshold, force.
         """
-        if limit in DEFLECTION.values():
-            return math.inf if self.nonlinear else limit.value * self.thickness
-        return limit.value * (self.indented if limit is INDENTATION else 1.0)
+        scales = {
+            Scale.ONE: 1.0,
+            Scale.LINEAR_PLATE: math.inf if self.nonlinear else self.thickness,
+            Scale.INDENTED_PLATE: self.indented,
+            Scale.THRESHOLD: threshold,
+        }
+        return limit.value * scales[limit.scale]
 
     def validity(self, extent: Extent) -> Texts:
         """Return ``"ok"``, or the reasons to doubt each case."""
@@ -246,7 +250,7 @@ class Judge(NamedTuple):
                 )
         for limit in LIMITS:
             if limit in extent.largest:
-                most = self.largest(limit) * (extent.threshold if limit is THRESHOLD else 1.0)
+                most = self.largest(limit, extent.threshold)
                 with np.errstate(invalid="ignore"):
                     beyond = np.asarray(extent.largest[limit] > most)
             else:

@@ -16,6 +16,7 @@ from fecm._typing import Floats
 from fecm._watch import SILENT, StoppedError, Watch
 from fecm.deck.model import Gages, Nonlinear
 from fecm.deck.units import unit_names
+from fecm.location.causes import BETTER, Cause, likely_cause
 from fecm.location.fit import LocationFit, PlaceTrial, judged_force
 from fecm.location.location import Location
 from fecm.location.model import Sampling, interpolation, moving_plate
@@ -33,7 +34,7 @@ from fecm.location.prepare import (
 )
 from fecm.location.search import Region, SearchResult, best_fits, is_wide, narrowed
 from fecm.location.table import StrainSource, StrainTable, strain_table
-from fecm.location.verdict import BETTER, Cause, is_doubtful, judged, likely_cause
+from fecm.location.verdict import is_doubtful, judged
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.loading import AnyDeck, sole_problem

@@ -9,6 +9,7 @@ from fecm._table import ShownNumber
 from fecm._text import FITTED_DIGITS
 from fecm.deck.units import readable, unit_names, unit_of
 from fecm.identification.result import Identification, identification_tables
+from fecm.judge.fits import NOT_CONVERGED, VERDICTS
 from fecm.judge.limits import Judgement, TrustLevel
 from fecm.plot.histories import force_fit_picture
 from fecm.report.content import (
@@ -24,12 +25,6 @@ from fecm.report.content import (
     share,
 )
 from fecm.report.figures import inside
-
-VERDICTS = {
-    "yes": (TrustLevel.WITHIN, "The fit is accepted: it describes the measurement."),
-    "with doubts": (TrustLevel.DOUBTFUL, "The fit is accepted with doubts: see Trust."),
-    "no": (TrustLevel.OUTSIDE, "The fit is not accepted: see Trust."),
-}
 
 
 def identification_page(name: str, fit: Identification) -> ReportPage:
@@ -60,9 +55,8 @@ def _format_parameter(fit: Identification, name: str) -> str:
 
 def _judgements(fit: Identification) -> Iterator[Judgement]:
     """Judge convergence and residual."""
-    level = TrustLevel.WITHIN if fit.converged else TrustLevel.OUTSIDE
-    yield Judgement(level, "converged", "yes" if fit.converged else "no")
-    yield Judgement(VERDICTS[fit.verdict][0], "accepted", fit.verdict)
+    yield NOT_CONVERGED.judgement("yes" if fit.converged else "no", beyond=not fit.converged)
+    yield Judgement(VERDICTS[fit.verdict].level, "accepted", fit.verdict)
     force = unit_of("force", unit_names(fit.deck))
     yield Judgement(
         TrustLevel.UNJUDGED, "residual, rms", number_with_unit(fit.rms, force), "noise and model"
