@@ -40,9 +40,13 @@ def _written(stream: io.TextIOWrapper) -> str:
     return stream.read()
 
 
-def call(*arguments: object, cwd: Path | None = None) -> Done:
-    """Call ``fecm`` with these arguments, in a folder if one is named."""
-    out, err = _stream(), _stream()
+def call(*arguments: object, cwd: Path | None = None, is_mixed: bool = False) -> Done:
+    """Call ``fecm`` with these arguments, in a folder if one is named.
+
+    With `is_mixed`, ``stdout`` has the lines of both streams in their order.
+    """
+    out = _stream()
+    err = out if is_mixed else _stream()
     with (
         contextlib.chdir(cwd or Path.cwd()),
         contextlib.redirect_stdout(out),
@@ -52,7 +56,7 @@ def call(*arguments: object, cwd: Path | None = None) -> Done:
     ):
         main(list(map(str, arguments)))
     assert isinstance(left.value.code, int)
-    return Done(left.value.code, _written(out), _written(err))
+    return Done(left.value.code, _written(out), "" if is_mixed else _written(err))
 
 
 def datasets_of(path: Path) -> list[str]:

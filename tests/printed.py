@@ -87,14 +87,14 @@ def run_python(text: str, folder: Path, names: dict[str, object]) -> str:
 def run_shell(text: str, folder: Path, *, fails: bool = False) -> str:
     """Run commands: those of ``fecm`` in this process if there are no others.
 
-    Returns what they print, standard error first.
+    Returns what they print, in the order of a terminal.
     """
     commands = text.replace("\\\n", " ").strip().split("\n")
     if all(line.startswith("fecm ") and not re.search("[|>]", line) for line in commands):
         printed = ""
         for line in commands:
-            done = call(*shlex.split(line, comments=True)[1:], cwd=folder)
-            printed += done.stderr + done.stdout
+            done = call(*shlex.split(line, comments=True)[1:], cwd=folder, is_mixed=True)
+            printed += done.stdout
             assert fails or done.exit_code == 0, f"{line}\n{printed}"
         return printed
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"

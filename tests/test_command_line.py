@@ -51,7 +51,7 @@ def test_a_run_writes_its_result_beside_the_user_and_says_what_came_out(tmp_path
         "6.19 ",
         "contact",
         "largest indent",
-        "energy balance",
+        "energy  ",
         "appendix.h5",
     ):
         assert words in done.stdout

@@ -200,7 +200,7 @@ def test_the_scatter_of_toughness_has_its_share_in_the_scatter_of_the_margin(
     assert random is not None
     first = random.sensitivity["threshold_margin"].first
     np.testing.assert_allclose(first, [1.0, 0.0], atol=0.05)
-    table = done.stdout.split("threshold_margin")[1].splitlines()
+    table = done.stdout.split("  threshold_margin ")[1].splitlines()
     assert table[1].split()[0] == "giic"
 
 

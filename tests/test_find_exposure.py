@@ -88,7 +88,7 @@ def test_a_run_at_the_found_velocity_has_this_exposure(tmp_path: Path) -> None:
     command = " ".join(("fecm sweep DECK", *options[:4], "finds the impact energy of the first"))
     assert command in call("run", "d.inp", cwd=tmp_path).stdout
     (velocity,) = swept["found_velocity"]
-    assert f"smallest found    {velocity:.4g}, " in done.stdout
+    assert f"found             {velocity:.4g}, " in done.stdout
     low, high = (swept[name][0] for name in ("found_energy_low", "found_energy_high"))
     assert (low, high) == (0.0, np.inf)  # four elements
     assert "; finer meshes not bounded" in done.stdout

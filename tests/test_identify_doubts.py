@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from contextlib import nullcontext
 from dataclasses import replace
@@ -223,7 +224,7 @@ def test_a_fit_with_a_doubt_says_so_in_table_json_and_page() -> None:
     fit = fecm.identify(doubted(), LONG, recorded(), ["k", "mass", "velocity"])
     doubted_fit = replace(fit, notes=("a reason",), doubts=("a reason",))
     assert doubted_fit.verdict == doubted_fit.to_dict()["verdict"] == "with doubts"
-    assert "accepted     with doubts" in str(doubted_fit)
+    assert "; accepted with doubts\n" in str(doubted_fit)
     page = page_of({"measured": doubted_fit})
     assert page.verdict[-1] == "The fit is accepted with doubts: see Trust."
     assert page.level.value == "doubtful"
@@ -285,7 +286,7 @@ def test_the_command_fails_where_values_are_not_to_be_used(tmp_path: Path) -> No
     assert "fit offset too" in done.stderr
     done = call("identify", "d.inp", "offset.csv", "--free", f"{free},offset", cwd=tmp_path)
     assert done.exit_code == 0
-    assert "1 % more in the deck  thickness  e1" in done.stdout
+    assert re.search("1 % more in the deck +thickness +e1", done.stdout)
 
 
 # A filter that nobody named ----------------------------------------------------------------------

@@ -178,7 +178,7 @@ def test_numbers_that_are_none_are_counted_and_left_out_of_the_range(
 def test_a_result_of_a_deck_without_impact_steps_is_told(tmp_path: Path) -> None:
     path = tmp_path / "idle.h5"
     fecm.run(small("LMAS\nDT        .5E-6\n"), output=path)
-    assert "nothing was stored" in words(path)
+    assert "Nothing was stored" in words(path)
 
 
 def test_a_title_can_not_command_the_terminal(changed: Callable[[Edit], Path]) -> None:

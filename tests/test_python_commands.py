@@ -266,10 +266,10 @@ def test_a_printed_result_is_the_summary_of_the_run_with_its_doubts(tmp_path: Pa
     (tmp_path / "small.inp").write_text(small())
     printed = call("run", "small.inp", cwd=tmp_path)
     lines = str(result).splitlines()
-    notes = [line for line in lines if line.startswith("  note ")]
+    notes = [f"note: {text}" for text in result.notes]
     shown = [line for line in printed.stdout.splitlines() if not line.startswith("  result ")]
-    assert [line for line in lines if line not in notes] == shown
-    assert [line[2:].split(None, 1)[1] for line in notes] == list(result.notes)
+    assert lines == [*shown, "", *notes]
+    assert printed.stderr.splitlines()[-len(notes) :] == [f"fecm: {note}" for note in notes]
     assert str(fecm.load(tmp_path / "small.h5")) == str(result)
 
 

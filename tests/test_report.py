@@ -394,7 +394,7 @@ def test_a_fit_has_a_page(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.stderr
     actual = read_page(output.read_text("utf-8"))
     k = actual.row("k")
-    said = re.search(r"^k +(\S+) lbf/in\^1.5 +(\S+) lbf/in\^1.5 ", done.stdout, re.MULTILINE)
+    said = re.search(r"^ +k +(\S+) lbf/in\^1.5 +(\S+) lbf/in\^1.5 ", done.stdout, re.MULTILINE)
     assert said is not None
     assert [float(f"{k[0].value:.5g}"), float(f"{k[1].value:.2g}")] == [
         float(text) for text in said.groups()

@@ -16,7 +16,7 @@ import pytest
 import fecm
 from fecm import SweepResult
 from fecm.authoring.case import CasesError
-from fecm.sweeps.summary import sweep_summary
+from fecm.sweeps.summary import summary_of_sweep
 from tests.calls import assert_unusable, call, datasets_of
 from tests.decks import DATA_CARDS, PROGRAM
 from tests.decks import small as small_of
@@ -90,7 +90,8 @@ def test_values_in_the_summary_have_the_digits_that_tell_cases_apart() -> None:
     ):
         cases = {"k": k, "velocity": np.full(3, velocity)}
         columns = {"peak_force": np.array([1.0, 5.0, 2.0]), "status": np.full(3, "ok")}
-        lines = sweep_summary(SweepResult(cases, columns, np.ones(3), np.ones(3)))
+        result = SweepResult(cases, columns, np.ones(3), np.ones(3))
+        lines = [*summary_of_sweep(result).lines()]
         assert any(shown in line for line in lines), lines
 
 

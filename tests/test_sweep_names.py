@@ -20,7 +20,7 @@ from fecm.problem.generate import generate
 from fecm.results.exposures import largest_exposures
 from fecm.sweeps import methods
 from fecm.sweeps.case_tables import parse_vary, read_cases
-from fecm.sweeps.summary import sweep_summary
+from fecm.sweeps.summary import summary_of_sweep
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, model, small
 
@@ -186,7 +186,7 @@ def test_places_that_can_not_be_hit_are_cases_with_a_reason() -> None:
     np.testing.assert_array_equal(swept["hit_x"], [50.0] * 4 + [np.nan] * 4)
     np.testing.assert_array_equal(swept["peak_force"][:2], swept["peak_force"][2:4])
     assert swept.unit("hit_x") == "mm"
-    (line,) = [line for line in sweep_summary(swept) if line.startswith("moved")]
+    (line,) = [line for line in summary_of_sweep(swept).lines() if line.startswith("moved")]
     assert line == "moved             2: to the nearest node, up to 2.236 mm away"
     patched = fecm.sweep(new(), {"at": places})
     assert patched["hit_x"][:2].tolist() == [50.0, 49.0]

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import re
+import shutil
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import click
 
 from fecm._errors import FecmError
 from fecm._files import open_for_writing
+from fecm._table import Part, Summary, summary_lines
 from fecm._text import jsonable, printable
 from fecm._watch import MINUTE, Watch
 from fecm.cli.interrupts import signals
@@ -29,6 +32,8 @@ NAMED_IN_MESSAGES = (
     "samples|scheduler|seed|sensitivity|units|until|vary"
 )
 LONGEST = 1000  # characters of a line of standard error
+# Styles of the lines of a summary on a terminal.
+STYLES: dict[Part, dict[str, Any]] = {Part.ANSWER: {"bold": True}, Part.HEADING: {"fg": "cyan"}}
 DASH = Path("-")  # standard input or output
 
 
@@ -42,15 +47,24 @@ class CheckFailedError(FecmError):
     exit_code = FAILED
 
 
-def echo(text: object = "", *, err: bool = False) -> None:
+def echo(text: object = "", *, err: bool = False, **style: Any) -> None:
     """Print lines to the terminal, with control characters escaped.
 
     A line of standard error that is longer than LONGEST loses its middle. An error of standard
-    output does not end the command; the exit status reports it.
+    output does not end the command; the exit status reports it. `style` has arguments of
+    :func:`click.style`.
     """
     lines = [printable(line) for line in str(text).split("\n")]
+    shown = "\n".join(map(_shortened, lines) if err else lines)
     with contextlib.suppress(OSError):
-        click.echo("\n".join(map(_shortened, lines) if err else lines), err=err)
+        click.echo(click.style(shown, **style) if style else shown, err=err)
+
+
+def echo_summary(summary: Summary) -> None:
+    """Print a summary without its notes; lines are wrapped to the width of a terminal."""
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    for line in summary_lines(summary, width):
+        echo(printable(line.text), **STYLES.get(line.part, {}))
 
 
 def _shortened(line: str) -> str:
@@ -91,7 +105,8 @@ def _named(argument: re.Match[str]) -> str:
 class TerminalWatch(Watch):
     """Watch that shows progress and notes of a job on standard error; a signal stops the job.
 
-    `advance` takes the number of new steps. Notes wait until :meth:`close` if a bar is shown.
+    `advance` takes the number of new steps. Notes wait until :meth:`close`, which a command calls
+    after its summary.
     """
 
     def __init__(self, advance: Callable[[int], object]) -> None:
@@ -105,10 +120,8 @@ class TerminalWatch(Watch):
         self._advance(new)
 
     def note(self, *texts: str) -> None:
-        """Print notes."""
+        """Keep notes."""
         self._notes += texts
-        if not sys.stderr.isatty():
-            self.close()
 
     def close(self) -> None:
         """Print the waiting notes."""
@@ -127,7 +140,8 @@ def watching(
 ) -> Iterator[TerminalWatch]:
     """Show the progress of a job; see :func:`progress`.
 
-    `remark` takes the number of steps or cases that are done.
+    `remark` takes the number of steps or cases that are done. Notes are printed after an error;
+    otherwise the caller prints them.
     """
     watch = TerminalWatch(lambda steps: None)
     end = None if remark is None else lambda _: remark(watch.done)
@@ -135,8 +149,9 @@ def watching(
         with progress(label, length, end) as advance:
             watch._advance = advance
             yield watch
-    finally:
+    except BaseException:
         watch.close()
+        raise
 
 
 @contextlib.contextmanager

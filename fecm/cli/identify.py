@@ -8,7 +8,16 @@ from typing import Any
 import click
 from click import option
 
-from fecm.cli.common import DASH, FAILED, TerminalWatch, echo, echo_json, every_minute, note
+from fecm.cli.common import (
+    DASH,
+    FAILED,
+    TerminalWatch,
+    echo,
+    echo_json,
+    echo_summary,
+    every_minute,
+    note,
+)
 from fecm.cli.decks import load_single
 from fecm.cli.options import (
     COLUMNS_OPTION,
@@ -26,6 +35,7 @@ from fecm.cli.options import (
 from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.deck.units import unit_names
 from fecm.identification.identify import FREE, IdentificationJob
+from fecm.identification.result import summary_of_fit
 from fecm.report.content import check_page
 from fecm.studies.rod_test.filters import filter_of
 
@@ -112,10 +122,11 @@ def identify_command(
 
         write_report({job.measurement.name: fit}, page, overwrite=overwrite)
         note(f"wrote {page}")
-    note(*fit.notes)
     if form is Format.JSON:
         echo_json(fit.to_dict())
     else:
-        echo(fit)
+        echo_summary(summary_of_fit(fit))
+        echo(f"\n{fit.cards()}")
+    note(*fit.notes)
     if not fit.accepted:
         raise SystemExit(FAILED)

@@ -14,17 +14,18 @@ import numpy as np
 
 from fecm._inputs import lines_of
 from fecm._machine import available_processors
-from fecm._table import aligned
+from fecm._table import Summary, aligned
 from fecm._text import printable, short_text
 from fecm._version import __version__
 from fecm.cli.common import echo_json
 from fecm.cli.isolation import reads
 from fecm.cli.options import FORMAT_OPTION, NAMED_PATH, Format, typical
 from fecm.deck.units import declared_units
+from fecm.results.contents import GroupJson, describe_groups
 from fecm.results.hdf5_reader import FileContents, read
 from fecm.results.result import result_of
 from fecm.results.schema import Form
-from fecm.results.summary import GroupJson, RunJson, about_run, describe_groups
+from fecm.results.summary import RunJson, about_run
 
 # Attributes of the file that are keys of the JSON output, of runs and of others.
 RUN_KEYS = ("title", "mode", "slips", "fecm_version", "format", "format_version")
@@ -119,6 +120,7 @@ class SweepFileJson(FileJson):
     """File of a sweep in JSON."""
 
     format: Literal[Form.SWEEP]
+    answer: Annotated[str, "The summary in one line."]
     summary: list[str]
     cases: int
     failed: int
@@ -128,6 +130,7 @@ class LocationFileJson(FileJson):
     """File of a location in JSON."""
 
     format: Literal[Form.LOCATION]
+    answer: Annotated[str, "The summary in one line."]
     summary: list[str]
 
 
@@ -137,14 +140,18 @@ def _about(contents: FileContents) -> dict[str, Any]:
         extent: dict[str, Any] = _about_sweep(contents)
     elif contents.form == Form.LOCATION:
         # 5 ms, which the result of a run does not need.
-        from fecm.location.location import location_of
+        from fecm.location.location import location_of, summary_of_location
 
-        extent = {"summary": str(location_of(contents)).split("\n")}
+        extent = _answer_and_lines(summary_of_location(location_of(contents)))
     else:
         extent = {**about_run(result_of(contents))}
     if extent.get("still_in_contact") and PERMANENT in contents.groups["history"]:
         contents.groups["history"][PERMANENT] = math.nan  # unknown before the end of the contact
-    attributes, lines = contents.attributes, extent.pop("summary")
+    attributes, lines, answer = (
+        contents.attributes,
+        extent.pop("summary"),
+        extent.pop("answer"),
+    )
     return {
         "file": printable(str(contents.path)),
         "size": contents.path.stat().st_size,
@@ -155,6 +162,7 @@ def _about(contents: FileContents) -> dict[str, Any]:
         "units": declared_units(attributes),
         **extent,
         "attributes": {n: value for n, value in attributes.items() if n not in HEADING},
+        "answer": answer,
         "summary": lines,
         "groups": describe_groups(contents),
         "texts": {n: {"lines": len(lines_of(text))} for n, text in contents.texts.items()},
@@ -165,12 +173,16 @@ def _about_sweep(contents: FileContents) -> dict[str, Any]:
     """Return the number of cases, and the summary."""
     # 48 ms, which the result of a run does not need.
     from fecm.sweeps.result import sweep_of
-    from fecm.sweeps.summary import sweep_summary, tables
+    from fecm.sweeps.summary import summary_of_sweep
 
     sweep = sweep_of(contents, history=False)
-    random = [] if sweep.random is None else tables(sweep.random, sweep.unit)
     failed = len(sweep) - int(sweep.completed.sum())
-    return {"cases": len(sweep), "failed": failed, "summary": [*sweep_summary(sweep), *random]}
+    return {"cases": len(sweep), "failed": failed, **_answer_and_lines(summary_of_sweep(sweep))}
+
+
+def _answer_and_lines(summary: Summary) -> dict[str, object]:
+    """Return the answer of a summary, and the lines of its groups."""
+    return {"answer": summary.answer, "summary": [*summary.lines()]}
 
 
 def _page(about: Mapping[str, Any]) -> list[str]:
@@ -202,7 +214,8 @@ def _page(about: Mapping[str, Any]) -> list[str]:
     ]
     lines = [printable(str(about["title"] or "(no title)"))]
     lines += [f"  {printable(name):17} {printable(str(value))}" for name, value in rows]
-    lines += ["", "summary", *(f"  {printable(line)}".rstrip() for line in about["summary"])]
+    summary = dict.fromkeys([about["answer"], *about["summary"]])  # the answer may be all
+    lines += ["", "summary", *(f"  {printable(line)}".rstrip() for line in summary)]
     for group in about["groups"]:
         lines += ["", *_group(group)]
     lines += ["", "texts"] if about["texts"] else []

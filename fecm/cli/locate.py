@@ -8,7 +8,7 @@ from typing import Any
 import click
 from click import option
 
-from fecm.cli.common import DASH, FAILED, echo, echo_json, every_minute, note
+from fecm.cli.common import DASH, FAILED, echo_json, echo_summary, every_minute, note
 from fecm.cli.decks import load_single
 from fecm.cli.interrupts import signals
 from fecm.cli.options import (
@@ -24,6 +24,7 @@ from fecm.cli.options import (
 )
 from fecm.cli.outputs import OutputPaths
 from fecm.location.locate import LocationJob
+from fecm.location.location import summary_of_location
 
 
 @click.command(
@@ -84,10 +85,10 @@ def locate_command(
         with signals.deferred():
             location.save(output, overwrite=overwrite)
         note(f"wrote {output}")
-    note(*location.notes)
     if form is Format.JSON:
         echo_json(location.to_dict())
     else:
-        echo(location)
+        echo_summary(summary_of_location(location))
+    note(*location.notes)
     if not location.accepted:
         raise SystemExit(FAILED)

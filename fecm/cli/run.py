@@ -15,7 +15,7 @@ from fecm.cli.common import (
     RefusedError,
     echo,
     echo_json,
-    echo_path,
+    echo_summary,
     watching,
 )
 from fecm.cli.decks import refusing_errors
@@ -38,7 +38,7 @@ from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.solutions import SingularStiffnessError
 from fecm.problem.summary import larger_steps
 from fecm.results.exposures import largest_exposures
-from fecm.results.summary import RunJson, about_run
+from fecm.results.summary import RUN, RunJson, about_run, summary_of_run
 from fecm.simulation.job import ProblemRun, Run
 
 # Headings of the help page, with options of the command itself.
@@ -125,24 +125,20 @@ def _run_and_print(job: ProblemRun, form: Format) -> list[tuple[str, float]]:
         watching("fecm", job.problem.work.steps) as watch,
         job.executing(watch) as result,
     ):
-        about = about_run(result)
+        about, summary = about_run(result), summary_of_run(result)
         exposures = [
             (f"exposure {e.exposure:.4g} of {e.criterion}", e.exposure)
             for e in largest_exposures(result)
         ]
-    if job.complete:
-        return []
-    if form is Format.JSON:
+    if not job.complete and form is Format.JSON:
         named = {"title": title, "result": str(path), "printed": job.printed}
         echo_json({**named, "units": result.units, **about})
-        return exposures
-    echo(title or "(no title)")
-    for line in (*about["summary"], *larger_steps(job.problem)):
-        echo(f"  {line}")
-    echo_path(path, "  result            ")
-    if job.printed is not None:
-        echo_path(job.printed, "  printed           ")
-    return exposures
+    elif not job.complete:
+        files = {"result": job.path, "printed": job.printed}
+        paths = [(label, str(path)) for label, path in files.items() if path is not None]
+        echo_summary(summary.with_rows(RUN, *larger_steps(job.problem), *paths))
+    watch.close()
+    return [] if job.complete else exposures
 
 
 @contextlib.contextmanager

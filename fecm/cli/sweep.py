@@ -17,6 +17,7 @@ from fecm.cli.common import (
     TerminalWatch,
     echo,
     echo_path,
+    echo_summary,
     every_minute,
     note,
     watching,
@@ -36,14 +37,13 @@ from fecm.cli.options import (
 )
 from fecm.mechanics.own_law import LawError
 from fecm.simulation.job import ProblemRun
-from fecm.sweeps.convergence import convergence_lines
 from fecm.sweeps.distributions import FORMS
 from fecm.sweeps.execute import address_in
 from fecm.sweeps.job import Sweep
 from fecm.sweeps.reduced import MOST_MODES
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.search import parse_until
-from fecm.sweeps.summary import remarks, sweep_summary, sweep_verdict, tables
+from fecm.sweeps.summary import remarks, summary_of_sweep, sweep_verdict
 from fecm.sweeps.task import MEASURES
 
 # For the shell's completion.
@@ -142,21 +142,23 @@ def sweep_command(
     with refusing_errors("; nothing was run"):
         job = Sweep(deck, **options)
     note(*job.doubts, *job.expectation())
-    result = _computed(job)
-    _print(result, job)
+    result, watch = _computed(job)
+    echo_summary(summary_of_sweep(result).with_rows("Run", ("result", str(job.path))))
     for case, run in job.full_runs().items():
         _run_in_full(case, run)
+    echo()
+    echo(sweep_verdict(result))
+    watch.close()
     if result.random is not None:
         note(*result.random.notes)
     note(*remarks(result))
-    echo(sweep_verdict(result))
     is_open = result.random is not None and result.random.exceedance.open.any()
     if (is_open or not result.completed.all()) and not allow_failed:
         raise SystemExit(FAILED)
 
 
-def _computed(job: Sweep) -> SweepResult:
-    """Compute the cases with a progress bar that shows the rate."""
+def _computed(job: Sweep) -> tuple[SweepResult, TerminalWatch]:
+    """Compute the cases with a progress bar that shows the rate; the watch has its notes."""
     begin = time.monotonic()
     workers = job.workers
 
@@ -169,20 +171,7 @@ def _computed(job: Sweep) -> SweepResult:
         signals.deferred(),
         watching("fecm", len(job.all_cases), rate) as watch,
     ):
-        return job.compute(watch, keeps_forces=False)
-
-
-def _print(result: SweepResult, job: Sweep) -> None:
-    """Print title, summary and the tables of a study of the mesh or of random values."""
-    echo(job.title)
-    lines = sweep_summary(result)
-    if studies := result.convergence:
-        lines += convergence_lines(result.cases, result.summary, studies)
-    for line in lines:
-        echo(f"  {line}")
-    for line in () if result.random is None else tables(result.random, result.unit):
-        echo(f"  {line}".rstrip())
-    echo_path(job.path, "  result            ")
+        return job.compute(watch, keeps_forces=False), watch
 
 
 class _EndingWatch(TerminalWatch):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fecm._measured_tables import IN_MEMORY, Record
-from fecm._table import Row, ShownNumber, Table, html_table, text_lines
+from fecm._table import Row, ShownNumber, Summary, Table, html_of
 from fecm._text import FITTED_DIGITS
 from fecm._typing import Floats
 from fecm.authoring.values import dimension_of
@@ -24,7 +24,6 @@ CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
     **dict.fromkeys(("k", "alpha_p", "s_p", "q"), Indentation),
     **dict.fromkeys(("mass", "rod_length", "rod_modulus", "rod_density"), Projectile),
 }
-LABEL_WIDTH = 13
 PLATE_ERRORS = "Change of the values with 1 % more of a property of the plate in the deck"
 
 
@@ -156,16 +155,30 @@ class Identification(Reported):
         }
 
     def __str__(self) -> str:
-        tables = ["\n".join(text_lines(t, LABEL_WIDTH)) for t in identification_tables(self)]
-        return "\n\n".join([*tables, self.cards()])
+        return f"{summary_of_fit(self)}\n\n{self.cards()}"
 
     def __repr__(self) -> str:
         return f"<fecm identification of {', '.join(self.values)}: accepted {self.verdict}>"
 
     def _repr_html_(self) -> str:
-        """Return tables of the fit and its notes, for notebooks."""
-        notes = (Table(tuple(("note", note) for note in self.notes)),) if self.notes else ()
-        return html_table(*identification_tables(self), *notes)
+        """Return answer, tables and notes, for notebooks."""
+        return html_of(self, summary_of_fit(self))
+
+
+def summary_of_fit(fit: Identification) -> Summary:
+    """Return the fitted values in one line, the tables of the fit, and its notes."""
+    values = ", ".join(f"{name} {_with_error(fit, name)}" for name in fit.values)
+    verdicts = {"yes": "accepted", "no": "not accepted"}
+    answer = f"{values}; {verdicts.get(fit.verdict, f'accepted {fit.verdict}')}"
+    groups = tuple(identification_tables(fit))
+    return Summary(fit.deck.title or "(no title)", answer, groups, fit.notes)
+
+
+def _with_error(fit: Identification, name: str) -> str:
+    """Format a fitted value with its standard error."""
+    power, unit = readable(fit.values[name], fit.unit(name), FITTED_DIGITS)
+    value, error = (number / 10.0**power for number in (fit.values[name], fit.errors[name]))
+    return f"{value:.{FITTED_DIGITS}g} ± {error:.2g} {unit}".rstrip()
 
 
 def identification_tables(fit: Identification) -> Iterator[Table]:

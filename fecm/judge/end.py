@@ -79,6 +79,11 @@ class EndMeaning(NamedTuple):
         """What is open, and what to do about it."""
         return "; ".join(filter(None, [self.what_is_open, self.remedy]))
 
+    @property
+    def reason(self) -> str:
+        """Reason to doubt a case; empty where the peak is known."""
+        return "" if self.doubt is None else self.doubt.reason
+
     def note(self, remedy: str = "") -> str:
         """Return the note of a run, by default with the remedy of the row."""
         return f"the run ends {self.where}: {self.what_is_open}; {remedy or self.remedy}"

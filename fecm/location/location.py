@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fecm._arrays import read_only
 from fecm._errors import FecmError, OptionsError, ResultFileError
 from fecm._measured_tables import IN_MEMORY, Record
-from fecm._table import Row, Table, html_summary, text_lines
+from fecm._table import Row, Summary, Table, html_of
 from fecm._text import FITTED_DIGITS
 from fecm._typing import AnyFile, Bools, Floats
 from fecm.deck.model import Deck
@@ -338,16 +338,15 @@ class Location(Saved):
         }
 
     def __str__(self) -> str:
-        return "\n".join(text_lines(location_table(self)))
+        return str(summary_of_location(self))
 
     def __repr__(self) -> str:
         verdict = "accepted" if self.accepted else "not accepted"
         return f"<fecm location at ({self.x:.4g}, {self.y:.4g}): {verdict}>"
 
     def _repr_html_(self) -> str:
-        """Return a table of the location and its notes, for notebooks."""
-        rows = (*location_table(self).rows, *(("note", note) for note in self.notes))
-        return html_summary(self, rows)
+        """Return answer, tables and notes, for notebooks."""
+        return html_of(self, summary_of_location(self))
 
     def _file_attributes(self) -> dict[str, Any]:
         """Return the attributes of the file."""
@@ -371,62 +370,77 @@ class Location(Saved):
         return {name: value for name, value in values.items() if value is not None}
 
 
-def location_table(location: Location) -> Table:
-    """Return the summary of a location, in the deck's units."""
+def summary_of_location(location: Location) -> Summary:
+    """Return place and peak force, groups of rows, and notes, in the deck's units."""
+    groups = (
+        Table(tuple(_place_rows(location)), title="Place"),
+        Table(tuple(_force_rows(location)), title="Force"),
+        Table(tuple(_record_rows(location)), title="Record"),
+    )
+    place = ", ".join(f"{axis} {_coordinate(location, axis)}" for axis in ("x", "y"))
+    verdict = "" if location.accepted else "; not accepted"
+    answer = f"Impact at {place}; peak force {_with_error(location, 'peak_force')}{verdict}"
+    return Summary(location.deck.title or "(no title)", answer, groups, location.notes)
 
-    def shown(name: str, value: float) -> str:
-        return quantity(value, location.unit(name), FITTED_DIGITS)
 
-    length = location.unit("x")
-    rows: list[Row] = [
-        ("x", f"{location.x:.5g} ± {location.sd_x:.2g} {length}".rstrip()),
-        ("y", f"{location.y:.5g} ± {location.sd_y:.2g} {length}".rstrip()),
-        ("correlation", f"{location.correlation:.2f}"),
-        (
-            "peak force",
-            f"{_with_error(location, 'peak_force')} at {shown('time', location.time_of_peak)}",
-        ),
-    ]
-    if location.peak_bias is not None and location.peak_bias > BIASED * (
-        location.sd_peak_force or 0.0
-    ):
-        bias = quantity(location.peak_bias, location.unit("peak_bias"), 2)
-        rows.append(("", f"the largest of noisy values, too high by about {bias}"))
-    rows += [
-        (
-            "impulse",
-            f"{_with_error(location, 'impulse')} until {shown('time', _impulse_end(location))}",
-        ),
-        ("contact", f"until {shown('time', _impulse_end(location))} at least"),
-    ]
+def _shown(location: Location, name: str, value: float) -> str:
+    return quantity(value, location.unit(name), FITTED_DIGITS)
+
+
+def _coordinate(location: Location, axis: str) -> str:
+    """Format x or y of the place with its standard deviation."""
+    value, deviation = getattr(location, axis), getattr(location, f"sd_{axis}")
+    return f"{value:.5g} ± {deviation:.2g} {location.unit(axis)}".rstrip()
+
+
+def _place_rows(location: Location) -> Iterator[Row]:
+    """Yield rows about the place, the mesh and other places."""
+    for axis in ("x", "y"):
+        yield (axis, _coordinate(location, axis))
+    yield ("correlation", f"{location.correlation:.2f}")
+    yield ("second place", _second_place(location))
+    yield ("mesh", _mesh_effect(location))
+    yield ("accepted", "yes" if location.accepted else "no")
+
+
+def _force_rows(location: Location) -> Iterator[Row]:
+    """Yield rows about the force, its impulse, and the energy of the projectile."""
+    when = _shown(location, "time", location.time_of_peak)
+    yield ("peak force", f"{_with_error(location, 'peak_force')} at {when}")
+    bias = location.peak_bias
+    if bias is not None and bias > BIASED * (location.sd_peak_force or 0.0):
+        text = quantity(bias, location.unit("peak_bias"), 2)
+        yield ("", f"the largest of noisy values, too high by about {text}")
+    until = f"until {_shown(location, 'time', _impulse_end(location))}"
+    yield ("impulse", f"{_with_error(location, 'impulse')} {until}")
+    yield ("contact", f"{until} at least")
     if location.energy_bound is not None:
-        bound = shown("energy_bound", location.energy_bound)
-        least = shown("energy_bound", 0.25 * location.energy_bound)
-        rows += [
-            ("energy bound", f"{bound} would be stopped by this impulse; a projectile that"),
-            ("", f"rebounds had less (down to {least}), one that moves on had more"),
-        ]
+        bound = _shown(location, "energy_bound", location.energy_bound)
+        least = _shown(location, "energy_bound", 0.25 * location.energy_bound)
+        yield (
+            "energy bound",
+            f"{bound} would be stopped by this impulse; a projectile that rebounds had less (down "
+            f"to {least}), one that moves on had more",
+        )
+
+
+def _record_rows(location: Location) -> Iterator[Row]:
+    """Yield rows about noise and misfit, and about corrections of the record."""
     noise, misfit = "from the residual", "1, as the noise is taken from the residual"
     if location.noise_given:
         noise, misfit = "as given", f"{location.misfit:.3g} times the noise"
-    rows += [
-        ("noise", f"strain {location.noise:.3g}, {noise}"),
-        ("misfit", misfit),
-        ("second place", _second_place(location)),
-        ("mesh", _mesh_effect(location)),
-        ("determined until", shown("time", location.determined_until)),
-    ]
+    yield ("noise", f"strain {location.noise:.3g}, {noise}")
+    yield ("misfit", misfit)
+    yield ("determined until", _shown(location, "time", location.determined_until))
     if location.sd_shift:
-        rows.append(
-            ("shift", f"{location.shift:.4g} ± {location.sd_shift:.2g} {location.unit('shift')}")
-        )
+        size = f"{location.shift:.4g} ± {location.sd_shift:.2g} {location.unit('shift')}"
+        yield ("shift", size)
     if location.sd_gains.any():
         gains = zip(location.gages.tolist(), location.gains, location.sd_gains, strict=True)
-        rows += [(f"gain of gage {n}", f"{gain:.4f} ± {sd:.2g}") for n, gain, sd in gains]
+        for number, gain, deviation in gains:
+            yield (f"gain of gage {number}", f"{gain:.4f} ± {deviation:.2g}")
     if location.record.file:
-        rows.append(("record", str(location.record)))
-    rows.append(("accepted", "yes" if location.accepted else "no"))
-    return Table(tuple(rows), title=location.deck.title or "(no title)")
+        yield ("record", str(location.record))
 
 
 def _mesh_effect(location: Location) -> str:

@@ -63,8 +63,8 @@ def equilibrium_change(problem: Problem) -> float | None:
         return None
 
 
-def larger_steps(problem: Problem) -> list[str]:
-    """Return the line about DT 0 if the deck's time step is far smaller."""
+def larger_steps(problem: Problem) -> list[Row]:
+    """Return the row about DT 0 if the deck's time step is far smaller."""
     largest = max((m.value for m in flat(problem.program) if m.word == "DT"), default=0.0)
     if not problem.work.steps or not 0.0 < largest < ROOM * problem.safe_time_step:
         return []
@@ -73,7 +73,7 @@ def larger_steps(problem: Problem) -> list[str]:
     fewer = (
         f"DT 0 takes at least {default}: {taken_time_step(least) / largest:.1f} times fewer steps"
     )
-    return [f"time step         DT is at most {largest / least:.2f} of the critical one; {fewer}"]
+    return [("time step", f"DT is at most {largest / least:.2f} of the critical one; {fewer}")]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from fecm._errors import ResultFileError, warn
-from fecm._table import html_summary
+from fecm._table import html_of
 from fecm._text import Decimal
 from fecm._typing import AnyFile, Floats
 from fecm.deck.model import Deck
@@ -363,16 +363,15 @@ class Result(Stored, Saved, Reported, schema.ContactRows, MetricAttributes):
         return f"<fecm result {self.title!r}, {self.mode} mode, {steps} steps>"
 
     def __str__(self) -> str:
-        from fecm.results.summary import run_text  # 4 ms at start
+        from fecm.results.summary import summary_of_run  # 4 ms at start
 
-        return "\n".join(run_text(self))
+        return str(summary_of_run(self))
 
     def _repr_html_(self) -> str:
-        """Return a table of the summary and the notes, for notebooks."""
-        from fecm.results.summary import run_table  # 4 ms at start
+        """Return answer, tables and notes, for notebooks."""
+        from fecm.results.summary import summary_of_run  # 4 ms at start
 
-        notes = tuple(("note", note) for note in self.notes)
-        return html_summary(self, run_table(self).rows + notes)
+        return html_of(self, summary_of_run(self))
 
 
 def load(path: str | Path | AnyFile) -> Result:

@@ -1,20 +1,19 @@
-"""Summary of a run, and the contents of a result file for `fecm info`."""
+"""Summary of a run: the line that answers, rows in groups, and notes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict, cast
+from typing import TYPE_CHECKING, Annotated, TypedDict, cast
 
 import numpy as np
 
-from fecm._table import Row, Table, label_lines, text_lines
+from fecm._table import Row, Summary, Table, label_lines
 from fecm._text import DECK_DIGITS, DIGITS, significant
-from fecm._typing import FiniteFloat, Floats
+from fecm._typing import Floats
 from fecm.deck.units import quantity as shown_quantity
 from fecm.deck.units import unit_of
-from fecm.judge.criteria import spelt
+from fecm.judge.criteria import failure_in_words, spelt
 from fecm.judge.end import ENDS, OPEN_PEAKS, End
 from fecm.judge.exposures import (
     LargestExposure,
@@ -23,8 +22,9 @@ from fecm.judge.exposures import (
     on_this_mesh,
     point_in_words,
 )
-from fecm.judge.limits import EXPOSURE, THRESHOLD
+from fecm.judge.limits import BALANCED, EXPOSURE, FAIL_EVALUATIONS, THRESHOLD
 from fecm.judge.threshold import from_threshold, threshold_outcome
+from fecm.judge.validity import reasons_of
 from fecm.results.exposures import (
     FailureJson,
     evaluations_in_contact,
@@ -32,40 +32,13 @@ from fecm.results.exposures import (
     first_failures,
     largest_exposures,
 )
-from fecm.results.groups import GROUPS
 from fecm.results.metrics import INITIAL_PLATE
+from fecm.results.onset import energy_at_force
 from fecm.results.run_metrics import end_of, impact_energy, metrics_of, start_w_of
-from fecm.results.schema import DATASETS
-from fecm.results.stored import Stored, row_blocks, whole_plate
+from fecm.results.stored import Stored, whole_plate
 
 if TYPE_CHECKING:
     from fecm.results.exposures import FirstFailure
-    from fecm.results.hdf5_reader import FileContents
-
-
-class DatasetJson(TypedDict):
-    """Dataset of a result file in JSON."""
-
-    name: str
-    shape: Sequence[int]
-    dtype: str
-    description: str
-    dimension: str
-    unit: str
-    min: FiniteFloat | None
-    max: FiniteFloat | None
-    not_finite: int
-    different: Annotated[int | None, "Number of different texts; null for numbers."]
-
-
-class GroupJson(TypedDict):
-    """Group of a result file in JSON."""
-
-    name: str
-    description: str
-    rows: int | None
-    attributes: dict[str, Any]
-    datasets: list[DatasetJson]
 
 
 class MetricsJson(TypedDict, total=False):
@@ -88,76 +61,12 @@ class RunJson(TypedDict):
     ]
     notes: list[str]
     metrics: MetricsJson
+    answer: Annotated[str, "The summary in one line."]
     summary: list[str]
 
 
-def describe_groups(contents: FileContents) -> list[GroupJson]:
-    """Describe the groups and datasets of a result file of a run or a sweep.
-
-    Each group has ``name`` (empty for the file itself), ``description``, ``rows`` (stored instants,
-    or None), ``attributes`` and ``datasets``. Each dataset has ``name`` (its path), ``shape``,
-    ``dtype`` (``"text"`` for texts), ``description``, ``dimension``, ``unit``, ``min`` and ``max``
-    of the finite numbers (None without any), ``not_finite`` and, for texts, the number of
-    ``different`` texts.
-    """
-    members: dict[str, list[DatasetJson]] = {name: [] for name in contents.groups}
-    for path in _sorted(contents, DATASETS):
-        members.setdefault(path.rpartition("/")[0], []).append(_describe(contents, path))
-    groups: list[GroupJson] = []
-    for name in _sorted(members, GROUPS):
-        attributes = dict(contents.groups.get(name, {})) if name else {}
-        description = str(attributes.pop("description", ""))
-        rows, *_ = contents.shapes.get(f"{name}/step") or (None,)
-        groups.append(
-            {
-                "name": name,
-                "description": description,
-                "rows": rows,
-                "attributes": attributes,
-                "datasets": members[name],
-            }
-        )
-    return groups
-
-
-def _sorted(names: Iterable[str], order_of_known: Iterable[str]) -> list[str]:
-    """Return known names in their order, then other names sorted."""
-    order = {name: number for number, name in enumerate(order_of_known)}
-    return sorted(names, key=lambda name: (order.get(name, len(order)), name))
-
-
-def _describe(contents: FileContents, path: str) -> DatasetJson:
-    """Return shape, type, attributes and range of one dataset."""
-    attributes, texts = contents.attributes_of(path), contents.lists.get(path)
-    minimum, maximum, not_finite = (None, None, 0) if texts is not None else _range(contents, path)
-    return {
-        "name": path,
-        "shape": contents.shapes[path],
-        "dtype": str(contents.dtypes[path]) if texts is None else "text",
-        "description": str(attributes.get("description", "")),
-        "dimension": str(attributes.get("dimension", "")),
-        "unit": str(attributes.get("unit", "")),
-        "min": minimum,
-        "max": maximum,
-        "not_finite": not_finite,
-        "different": None if texts is None else len(set(texts)),
-    }
-
-
-def _range(contents: FileContents, path: str) -> tuple[float | None, float | None, int]:
-    """Return minimum and maximum of the finite numbers, and the count of others."""
-    minimum, maximum, not_finite = math.inf, -math.inf, 0
-    for start, stop in row_blocks(contents.shapes[path]):
-        block = contents.rows(path, start, stop)
-        finite = np.isfinite(block)
-        not_finite += int(block.size - np.count_nonzero(finite))
-        if finite.any():
-            minimum = min(minimum, block[finite].min().item())
-            maximum = max(maximum, block[finite].max().item())
-    return (minimum, maximum, not_finite) if minimum <= maximum else (None, None, not_finite)
-
-
 NEAR = 0.05  # distance of a row from the peak, over its time, that counts as the peak
+RUN = "Run"  # heading of the group about steps and files
 LISTED = 6  # most contacts and frequencies listed individually
 # Parts by the caller of the run: attribute, name, and the segment of the deck that they replace.
 OWN_PARTS = (("law", "contact law", "EXPE"), ("projectile", "projectile", "PROJ"))
@@ -173,54 +82,162 @@ def search_for(event: str, until: str) -> str:
     return f"{command} finds the impact energy of {event}"
 
 
+def summary_of_run(result: Stored) -> Summary:
+    """Return answer, groups of rows and notes of a result, in the deck's units."""
+    title, notes = result.title or "(no title)", tuple(result.notes)
+    if missing := _missing(result):
+        return Summary(title, missing, (), notes)
+    groups = (
+        Table(tuple(_response(result)), title="Response"),
+        Table(tuple(_damage(result)), title="Damage"),
+        Table(tuple(_model(result)), title="Model"),
+        Table(tuple(_steps(result)), title=RUN),
+    )
+    return Summary(title, run_answer(result), groups, notes)
+
+
 def run_summary(result: Stored) -> list[str]:
-    """Return the rows of :func:`run_table` as lines of text."""
-    return text_lines(run_table(result))
+    """Return the rows of :func:`summary_of_run` as lines of text."""
+    summary = summary_of_run(result)
+    return label_lines(summary.rows) or [summary.answer]
 
 
 def run_table(result: Stored) -> Table:
-    """Return the summary of a result, in the deck's units."""
-    return Table(tuple(_run_rows(result)), title=result.title or "(no title)")
+    """Return the rows of :func:`summary_of_run` as one table."""
+    summary = summary_of_run(result)
+    return Table(summary.rows, title=summary.title)
 
 
-def _run_rows(result: Stored) -> list[Row]:
-    quantity = partial(_quantity, result)
-    lines: list[Row] = [
+def run_answer(result: Stored) -> str:
+    """Say in one line what happened: peak force, delamination, first failure."""
+    if "history/force" in result:
+        parts = [_peak_answer(result)]
+    else:
+        (label, text), *_ = [*_response(result), ("nothing was stored", "")]
+        parts = [f"{label} {text}".rstrip()]
+    if result.threshold:
+        parts.append(_delamination_answer(result))
+    parts += [*_failure_answer(result), *_doubt_answer(result)]
+    answer = "; ".join(parts)
+    return f"{answer[0].upper()}{answer[1:]}"
+
+
+def _peak_answer(result: Stored) -> str:
+    """Say how large the peak force is, and whether it is an elastic prediction."""
+    peak = float(result.whole("history/force").max())
+    if not peak > 0.0:
+        return "there was no contact"
+    least = "at least " if end_of(result) in OPEN_PEAKS else ""
+    doubt = " (elastic)" if elastic_doubt(result, peak) else ""
+    return f"peak force {least}{_quantity(result, peak, 'force')}{doubt}"
+
+
+def _delamination_answer(result: Stored) -> str:
+    """Say whether the plate delaminates, and from which force and energy."""
+    force = _with_energy(result, float(result.threshold["force"]))
+    if math.isfinite(float(result.threshold["time"])):
+        return f"delaminates, {from_threshold(result.threshold.get('number'))} {force}"
+    return f"delamination threshold of {force} {threshold_verdict(result)}"
+
+
+def _with_energy(result: Stored, force: float) -> str:
+    """Format a force, and the impact energy whose peak it is, if the run gives it."""
+    energy = _scaled_energy(result, force)
+    return f"{_quantity(result, force, 'force')}{f' ({energy})' if energy else ''}"
+
+
+def _scaled_energy(result: Stored, force: float) -> str:
+    """Format the impact energy whose peak force is `force`, scaled from the run.
+
+    The text is empty if the energy is not known.
+    """
+    energy = energy_at_force(result, force)
+    return "" if math.isnan(energy) else f"about {_quantity(result, energy, 'force*length', 3)}"
+
+
+def _failure_answer(result: Stored) -> list[str]:
+    """Say where and from which force the first failure is; empty without FAIL."""
+    largest = largest_exposures(result)
+    if not largest:
+        return []
+    if not (first := _first_failures(result)):
+        most = max(exposure.exposure for exposure in largest)
+        return [f"failure: {no_failure(largest, end_of(result))} (largest exposure {most:.3g})"]
+    failure = first[0]
+    words = failure_in_words(failure.criterion, failure.mode, failure.where)
+    at = "" if math.isnan(failure.force) else f", at {_with_energy(result, failure.force)}"
+    return [f"first failure: {on_this_mesh(largest)}{words}{at}"]
+
+
+def _doubt_answer(result: Stored) -> list[str]:
+    """Say which limits of the model are exceeded, besides what the other parts say."""
+    said = {EXPOSURE.reason, THRESHOLD.reason, *(ENDS[end].reason for end in OPEN_PEAKS)}
+    doubts = [reason for reason in reasons_of(result.validity) if reason not in said]
+    return [f"doubtful: {', '.join(doubts)}"] if doubts else []
+
+
+def _response(result: Stored) -> list[Row]:
+    """Return rows about force, contact, indentation, deflection and energy, and frequencies."""
+    rows: list[Row] = []
+    if "history/force" in result:
+        rows += _impact(result)
+    elif "tape3/w" in result and (w := result["tape3/w"]).any():
+        row, node = np.unravel_index(int(np.abs(w).argmax()), w.shape)
+        text = f"{_quantity(result, w[row, node], 'length')} at node {node + 1}"
+        rows.append(("largest w", text))
+    elif "tape3/w" in result:
+        rows.append(("largest w", "0: nothing moved the plate"))
+    if text := _membrane(result):
+        rows.append(("membrane", text))
+    if "modes/angular_frequency" in result:
+        frequencies = result["modes/angular_frequency"]
+        texts = ", ".join(significant(omega) for omega in frequencies[:LISTED])
+        more = f" and {len(frequencies) - LISTED} more" if len(frequencies) > LISTED else ""
+        unit = result.unit("modes/angular_frequency")
+        rows.append(("frequencies", f"{texts}{more} {unit}".rstrip()))
+    return rows
+
+
+def _damage(result: Stored) -> list[Row]:
+    """Return rows about delamination, first failure and exposures."""
+    rows: list[Row] = []
+    if result.threshold:
+        rows.append(("delamination", _delamination(result)))
+        if energy := _scaled_energy(result, float(result.threshold["force"])):
+            rows.append(("", f"{energy} of impact energy for it, scaled from this run"))
+        if math.isfinite(float(result.threshold["time"])):
+            rows.append(("", search_for(*THRESHOLD_EVENT)))
+    if "failure/x" in result:
+        rows += _exposures(result)
+    return rows
+
+
+def _model(result: Stored) -> list[Row]:
+    """Return rows about parts, symmetry, curvature, preload and the load before the impact."""
+    rows: list[Row] = [
         (what, f"{result.attributes[name]}, instead of {card}")
         for name, what, card in OWN_PARTS
         if name in result.attributes
     ]
     if text := whole_plate(result.symmetry_factor):
-        lines.append(("symmetry", text))
+        rows.append(("symmetry", text))
+    rows += [*_curved(result), *_preload(result)]
+    if "history/force" in result:
+        rows += _before_impact(result)
+    return rows
+
+
+def _steps(result: Stored) -> list[Row]:
+    """Return rows about the steps, and an energy balance that is off."""
+    rows: list[Row] = []
     clock = "history/time" if "history/force" in result else "energy/time"
     if clock in result:
         time = result[clock]
-        lines.append(("steps", f"{len(time)}, up to time {quantity(time[-1], 'time')}"))
-    lines += _curved(result)
-    lines += _preload(result)
+        until = _quantity(result, time[-1], "time")
+        rows.append(("steps", f"{len(time)}, up to time {until}"))
     if "history/force" in result:
-        lines += _impact(result)
-    elif "tape3/w" in result and (w := result["tape3/w"]).any():
-        row, node = np.unravel_index(int(np.abs(w).argmax()), w.shape)
-        lines.append(("largest w", f"{quantity(w[row, node], 'length')} at node {node + 1}"))
-    elif "tape3/w" in result:
-        lines.append(("largest w", "0: nothing moved the plate"))
-    if text := _membrane(result):
-        lines.append(("membrane", text))
-    if result.threshold:
-        lines.append(("delamination", _delamination(result)))
-        if math.isfinite(float(result.threshold["time"])):
-            lines.append(("", search_for(*THRESHOLD_EVENT)))
-    if "failure/x" in result:
-        lines += _exposures(result)
-    if "modes/angular_frequency" in result:
-        frequencies = result["modes/angular_frequency"]
-        texts = ", ".join(significant(omega) for omega in frequencies[:LISTED])
-        more = f" and {len(frequencies) - LISTED} more" if len(frequencies) > LISTED else ""
-        lines.append(
-            ("frequencies", f"{texts}{more} {result.unit('modes/angular_frequency')}".rstrip())
-        )
-    return lines or [("nothing was stored", "")]
+        rows += _energy_balance(result)
+    return rows
 
 
 def radii_of(result: Stored) -> dict[str, float]:
@@ -318,30 +335,30 @@ def lowest_criterion(result: Stored) -> list[str]:
 
 
 def _exposures(result: Stored) -> list[Row]:
-    """Return rows about the largest exposures and the first failure."""
+    """Return rows about the first failure and the largest exposures."""
     largest, first = largest_exposures(result), _first_failures(result)
+    count = evaluations_in_contact(result)
+    rows: list[Row] = []
+    if first:
+        text = f"{on_this_mesh(largest)}{_first_failure(result, first[0])}"
+        rows.append(("first failure", text))
+        if not math.isnan(first[0].force):
+            rows.append(("", search_for(*FAILURE_EVENT)))
+    elif largest and count:
+        rows.append(("first failure", no_failure(largest, end_of(result))))
     reached = {
         failure.criterion: failure.force for failure in first if not math.isnan(failure.force)
     }
-    lines: list[Row] = []
     for exposure in largest:
         force = reached.get(exposure.criterion)
         reaches = "" if force is None else f"; reaches 1 at {_quantity(result, force, 'force')}"
         text = f"{_exposure(result, exposure)}{reaches}{_at_rest(exposure)}"
-        lines.append((spelt(exposure.criterion), text))
-    count = evaluations_in_contact(result)
-    if count is not None and "history/force" in result:
-        lines.append(("evaluations", f"{count} of FAIL during contact"))
-    if first:
-        text = f"{on_this_mesh(largest)}{_first_failure(result, first[0])}"
-        lines.append(("first failure", text))
-        if not math.isnan(first[0].force):
-            lines.append(("", search_for(*FAILURE_EVENT)))
-    elif largest and count:
-        lines.append(("first failure", no_failure(largest, end_of(result))))
+        rows.append((spelt(exposure.criterion), text))
+    if count is not None and "history/force" in result and count < FAIL_EVALUATIONS.value:
+        rows.append(("evaluations", f"{count} of FAIL during contact"))
     if left_out := np.count_nonzero(result["failure/under_load"]) * result.symmetry_factor:
-        lines.append(("left out", f"{left_out} points under the load or at corners of supports"))
-    return lines
+        rows.append(("left out", f"{left_out} points under the load or at corners of supports"))
+    return rows
 
 
 def _first_failures(result: Stored) -> list[FirstFailure]:
@@ -421,18 +438,18 @@ def _quantity(result: Stored, value: float, dimension: str, digits: int = DIGITS
 
 def _impact(result: Stored) -> list[Row]:
     """Return rows about forces, contacts, indentation and energy of an impact."""
-    lines = [*_before_impact(result), ("peak force", _peak_force(result))]
+    rows: list[Row] = [("peak force", _peak_force(result))]
     if intervals := _intervals(result):
         indentation, w = result["history/indentation"], result["history/plate_w"]
-        lines += [
+        rows += [
             ("contact", _contacts(result, intervals)),
-            ("largest indent", f"{_largest(result, indentation)}, permanent {_left(result)}"),
             ("largest w", f"{_at_least(result)}{_largest(result, w, ' under the load')}"),
+            ("largest indent", f"{_largest(result, indentation)}{_left(result)}"),
         ]
-        if not math.isnan(metrics_of(result)["rebound_velocity"]):
-            lines.append(("rebound", _rebound(result)))
-            lines.append(("contact loop", _contact_loop(result)))
-    return [*lines, ("energy balance", _energy_balance(result))]
+    rows.append(("energy", _energy(result)))
+    if not math.isnan(metrics_of(result)["rebound_velocity"]):
+        rows.append(("rebound", _rebound(result)))
+    return [*rows, *_contact_loop(result)]
 
 
 def _before_impact(result: Stored) -> list[Row]:
@@ -505,40 +522,49 @@ def _largest(result: Stored, lengths: Floats, where: str = "") -> str:
 
 
 def _left(result: Stored) -> str:
-    """Format the permanent indentation."""
+    """Format the permanent indentation; empty if the contact law has none."""
     if end_of(result) is not End.OVER:
-        return "open"
+        return ", permanent open"
     permanent = float(result.attributes_of("history")["permanent_indentation"])
-    text = _quantity(result, permanent, "length")
-    return text if permanent else f"{text} by the contact law"
+    return f", permanent {_quantity(result, permanent, 'length')}" if permanent else ""
+
+
+def _energy(result: Stored) -> str:
+    """Format the impact energy, and how much of it the projectile has left behind."""
+    text = _quantity(result, impact_energy(result), "force*length")
+    absorbed = metrics_of(result)["energy_absorbed"]
+    if math.isnan(absorbed):
+        return text
+    left = _quantity(result, absorbed, "force*length")
+    return f"{text}, {left} absorbed (left in plate, indentation and projectile)"
 
 
 def _rebound(result: Stored) -> str:
-    """Format the velocity and the energy that the projectile has left."""
+    """Format the velocity of the projectile after the impact, and its impulse."""
     metrics = metrics_of(result)
-    return (
-        f"{_quantity(result, metrics['rebound_velocity'], 'length/time')}, "
-        f"impulse {_quantity(result, metrics['impulse'], 'force*time')}, "
-        f"{_quantity(result, metrics['energy_absorbed'], 'force*length')} "
-        "absorbed (left in plate, indentation and projectile)"
-    )
+    velocity = _quantity(result, metrics["rebound_velocity"], "length/time")
+    return f"{velocity}, impulse {_quantity(result, metrics['impulse'], 'force*time')}"
 
 
-def _contact_loop(result: Stored) -> str:
-    """Format the work that the indentation keeps, and its share of the impact energy."""
+def _contact_loop(result: Stored) -> list[Row]:
+    """Return the row of the work that the indentation keeps, which an elastic law does not."""
     work = metrics_of(result)["contact_loop"]
-    if abs(work) <= np.abs(result.whole("energy/balance_error")).max():  # of an elastic law
-        return f"{_quantity(result, 0.0, 'force*length')} kept by the indentation"
+    if not abs(work) > np.abs(result.whole("energy/balance_error")).max():
+        return []
     share = f"{work / impact_energy(result):.1%} of the impact energy"
-    return f"{_quantity(result, work, 'force*length')} kept by the indentation, {share}"
+    kept = _quantity(result, work, "force*length")
+    return [("contact loop", f"{kept} kept by the indentation, {share}")]
 
 
-def _energy_balance(result: Stored) -> str:
-    """Format the largest error of the energy balance, relative to the impact energy."""
+def _energy_balance(result: Stored) -> list[Row]:
+    """Return the row of the largest error of the energy balance, if it is doubtful."""
     initial = impact_energy(result)
     worst = float(np.abs(result.whole("energy/balance_error")).max())
+    if worst <= BALANCED * initial:
+        return []
     share = f"{worst / initial:.2g} of the initial" if initial else f"{worst:.3g}, initially"
-    return f"worst error {share} {_quantity(result, initial, 'force*length')}"
+    text = f"worst error {share} {_quantity(result, initial, 'force*length')}"
+    return [("energy balance", text)]
 
 
 def elastic_doubt(result: Stored, peak: float) -> str:
@@ -551,17 +577,10 @@ def elastic_doubt(result: Stored, peak: float) -> str:
     return f"elastic prediction; {', and '.join(beyond)}" if beyond else ""
 
 
-def run_text(result: Stored) -> list[str]:
-    """Return title, summary and notes, as ``fecm run`` prints them."""
-    notes = label_lines(("note", note) for note in result.notes)
-    lines = [*(_missing(result) or run_summary(result)), *notes]
-    return [result.title or "(no title)", *(f"  {line}" for line in lines)]
-
-
 def about_run(result: Stored) -> RunJson:
     """Return steps, first and last time, metrics and summary of a run."""
     steps = len(result["history/time"]) if "history/time" in result else 0
-    missing = _missing(result)
+    missing, summary = _missing(result), summary_of_run(result)
     return {
         "steps": steps,
         "time": result["history/time"][[0, -1]].tolist() if steps else None,
@@ -570,7 +589,8 @@ def about_run(result: Stored) -> RunJson:
         "validity": result.validity,
         "notes": list(result.notes),
         "metrics": {} if missing else _metrics(result),
-        "summary": missing or run_summary(result),
+        "answer": summary.answer,
+        "summary": run_summary(result),
     }
 
 
@@ -582,14 +602,14 @@ def _metrics(result: Stored) -> MetricsJson:
     return cast("MetricsJson", metrics)
 
 
-def _missing(result: Stored) -> list[str]:
+def _missing(result: Stored) -> str:
     """Return the reason why an incomplete file has no summary; empty if it has one."""
     needed = ("history/time", "history/indentation", "history/plate_w", "energy/balance_error")
     if "history/force" in result:
         if not len(result["history/force"]) or any(name not in result for name in needed):
-            return ["no summary: history or energies are not complete"]
+            return "no summary: history or energies are not complete"
         permanent = result.attributes_of("history").get("permanent_indentation")
         initial = result.attributes_of("energy").get("initial")
         if not all(isinstance(value, int | float) for value in (permanent, initial)):
-            return ["no summary: permanent_indentation or the initial energy is missing"]
-    return []
+            return "no summary: permanent_indentation or the initial energy is missing"
+    return ""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fecm._table import aligned
+from fecm._table import Row, ShownNumber, Table
 from fecm._typing import Floats
 from fecm.authoring.case import Case, CasesError
 from fecm.authoring.time_values import stable_time_step
@@ -110,21 +110,25 @@ def _limit(values: Floats, highest: float) -> Convergence:
     return Convergence(order, last + rest, UNCONFIRMED * abs(rest), remark)
 
 
-def convergence_lines(
+def convergence_table(
     cases: Mapping[str, Column], summary: Mapping[str, Column], studies: Mapping[str, Convergence]
-) -> list[str]:
-    """Return lines of the values of every case, and of order, limit and band of every quantity."""
-    rows = [[n, *(f"{v:.6g}" for v in cases[n].tolist()), "", "", "", ""] for n in cases]
-    rows[0][-4:-1] = "order", "limit", "band"
+) -> Table:
+    """Return the values of every mesh, and order, limit and band of every quantity."""
+    factors, *others = cases
+    rows: list[Row] = [
+        (name, *(ShownNumber(v, f"{v:.6g}") for v in cases[name].tolist()), *[""] * 4)
+        for name in others
+    ]
     for name, study in studies.items():
-        order = "" if math.isnan(study.order) else f"{study.order:.2f}"
-        limit = "" if math.isnan(study.limit) else f"{study.limit:.6g}"
-        band = "" if math.isnan(study.band) else f"±{study.band:.2g}"
-        values = (f"{value:.6g}" for value in summary[name].tolist())
-        rows.append([name, *values, order, limit, band, study.remark])
-    names, *numbers, remarks = zip(*rows, strict=True)
-    justified = ([text.rjust(max(map(len, column))) for text in column] for column in numbers)
-    return aligned(list(zip(names, *justified, remarks, strict=True)))
+        values = (ShownNumber(value, f"{value:.6g}") for value in summary[name].tolist())
+        numbers = (study.order, ".2f", ""), (study.limit, ".6g", ""), (study.band, ".2g", "±")
+        limits = (
+            ShownNumber(value, "" if math.isnan(value) else f"{sign}{value:{form}}")
+            for value, form, sign in numbers
+        )
+        rows.append((name, *values, *limits, study.remark))
+    header = (factors, *(f"{v:g}" for v in cases[factors].tolist()), "order", "limit", "band", "")
+    return Table(tuple(rows), header, "Refinement")
 
 
 FACTORS = "1,2,4,8"

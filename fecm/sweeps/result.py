@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from fecm._errors import ResultFileError
 from fecm._files import check_outputs, open_for_writing
-from fecm._table import html_summary
+from fecm._table import html_of
 from fecm._text import Decimal
 from fecm._typing import AnyFile
 from fecm.deck.model import Delamination
@@ -33,7 +34,7 @@ from fecm.sweeps.summary import (
     doubtful_counts,
     reasons,
     remarks,
-    sweep_rows,
+    summary_of_sweep,
     sweep_verdict,
 )
 from fecm.sweeps.task import Plan
@@ -89,8 +90,8 @@ class SweepResult(StoredSweep, Saved, Reported):
         return f"<fecm sweep {self.title!r} over {', '.join(self.cases)}: {sweep_verdict(self)}>"
 
     def _repr_html_(self) -> str:
-        """Return a table of the summary, for notebooks."""
-        return html_summary(self, sweep_rows(self))
+        """Return answer, tables and notes, for notebooks."""
+        return html_of(self, replace(summary_of_sweep(self), notes=self.notes))
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -4,25 +4,36 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from fecm._errors import ResultFileError
-from fecm._table import Row, label_lines
+from fecm._table import Row, ShownNumber, Summary, Table
 from fecm._text import DIGITS, significant
 from fecm._typing import Bools
 from fecm.authoring.case import pair_of_text
 from fecm.deck.model import Curvature, Delamination, Preload, Segment
-from fecm.deck.units import column_name, quantity
+from fecm.deck.units import column_name, quantity, readable
 from fecm.judge.exposures import finer_meshes
-from fecm.judge.limits import FREE_DEFLECTION, TOO_SOFT
+from fecm.judge.limits import EXPOSURE, FREE_DEFLECTION, TOO_SOFT
+from fecm.judge.limits import THRESHOLD as THRESHOLD_LIMIT
 from fecm.judge.threshold import AT_THE_LATEST, from_threshold
-from fecm.judge.validity import BENT, InPlane, counted, in_plane_of, softness, unsafe
+from fecm.judge.validity import (
+    BENT,
+    InPlane,
+    counted,
+    in_plane_of,
+    reasons_of,
+    softness,
+    unsafe,
+)
 from fecm.problem.generate import generate
 from fecm.problem.symmetry import symmetry_of
 from fecm.results.metrics import FACTOR, FOUND_BAND, RATIO, THRESHOLD_FORCE
 from fecm.results.stored import whole_plate
+from fecm.sweeps.convergence import Convergence, convergence_table
 from fecm.sweeps.limits import THRESHOLD
 from fecm.sweeps.measured import comparisons
 from fecm.sweeps.outcome import Column
@@ -38,20 +49,114 @@ SAME_FORCE = 1e-4  # distance of a force found from the threshold, relative to t
 SAME_PLACE = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
 
 
-def sweep_summary(result: StoredSweep) -> list[str]:
-    """Return the lines of :func:`sweep_rows`."""
-    return label_lines(sweep_rows(result))
+def summary_of_sweep(result: StoredSweep) -> Summary:
+    """Return answer and groups of rows of a sweep; its notes are those of the result."""
+    studies = result.convergence
+    groups = [Table(tuple(_case_rows(result)), title="Cases")]
+    if studies:
+        groups.append(convergence_table(result.cases, result.summary, studies))
+    if result.random is not None:
+        groups += random_tables(result.random, result.unit)
+    return Summary(result.title or "(no title)", sweep_answer(result), tuple(groups))
 
 
-def sweep_rows(result: StoredSweep) -> list[Row]:
-    """Summarise a sweep: number of cases, extreme peaks or velocities, failures."""
+def sweep_answer(result: StoredSweep) -> str:
+    """Say in one line how large the peak forces are, or which energies were found."""
+    if not result.completed.any():
+        return f"No case was computed: {reasons(result['status'])}"
+    parts = _found_answer(result) if "found_energy" in result.summary else _peak_answer(result)
+    if result.random is not None:
+        parts += _chances(result.random)
+    answer = "; ".join(parts)
+    return f"{answer[0].upper()}{answer[1:]}"
+
+
+def _peak_answer(result: StoredSweep) -> list[str]:
+    """Say how large the peak forces are, and how many cases delaminate or fail."""
+    parts = [f"peak force {_range_of(result, 'peak_force')}"]
+    if (study := result.convergence.get("peak_force")) is not None:
+        parts = [_limit_answer(result, study)]
+    reasons_by_case = [reasons_of(validity) for validity in result.validity.tolist()]
+    for limit, what in ((THRESHOLD_LIMIT, "delamination threshold"), (EXPOSURE, "first failure")):
+        beyond = np.array([limit.reason in reasons for reasons in reasons_by_case])
+        if beyond.any():
+            parts.append(
+                f"{beyond.sum()} of {len(result)} beyond the {what}{_from(result, beyond)}"
+            )
+    return parts
+
+
+def _range_of(result: StoredSweep, name: str) -> str:
+    """Format the mean and the standard deviation of draws, or the range of other cases."""
+    unit = result.unit(name)
+    if result.random is not None and not result.random.combinations:
+        statistics = result.random.statistics[name]
+        moments = [float(statistics.mean), float(statistics.standard_deviation)]
+        return _together([m for m in moments if math.isfinite(m)], "±", unit) or "open"
+    values = result[name][result.completed]
+    values = values[np.isfinite(values)]
+    ends = sorted({float(values.min()), float(values.max())}) if values.size else []
+    return _together(ends, "to", unit) or "open"
+
+
+def _together(values: Sequence[float], word: str, unit: str) -> str:
+    """Format values with a word between them and one unit, which suits the first.
+
+    Examples
+    --------
+    >>> _together([950.0, 1200.0], "to", "N*mm")
+    '950 to 1200 mJ'
+    """
+    if not values:
+        return ""
+    power, name = readable(values[0], unit)
+    texts = (significant(value / 10.0**power) for value in values)
+    return f"{f' {word} '.join(texts)} {name}".rstrip()
+
+
+def _limit_answer(result: StoredSweep, study: Convergence) -> str:
+    """Format the peak force of the finest mesh, and its limit."""
+    unit = result.unit("peak_force")
+    finest = f"peak force {quantity(float(result['peak_force'][-1]), unit)} on the finest mesh"
+    if math.isnan(study.limit):
+        return f"{finest}: {study.remark}"
+    band = "" if math.isnan(study.band) else f" (±{quantity(study.band, unit, 2)})"
+    return f"{finest}{band}, limit {quantity(study.limit, unit)}"
+
+
+def _from(result: StoredSweep, beyond: Bools) -> str:
+    """Say from which value on the cases are beyond a limit, if one value alone decides it."""
+    (name, values), *others = result.cases.items()
+    if others or values.dtype.kind != "f" or beyond.all():
+        return ""
+    first = float(values[beyond].min())
+    if values[~beyond].max() >= first:
+        return ""
+    return f", from {name} {quantity(first, result.unit(name))} on"
+
+
+def _found_answer(result: StoredSweep) -> list[str]:
+    """Say at which energies the value searched for is reached."""
+    if _is_at_threshold(result):
+        what = f"delaminates, {from_threshold_of(result)}"
+    elif all(name in result.summary for name in FOUND_BAND):
+        what = "first failure at"
+    else:
+        what = f"peak force {_range_of(result, 'peak_force')} from"
+    energy, velocity = (_range_of(result, f"found_{name}") for name in ("energy", "velocity"))
+    return [f"{what} {energy} ({velocity})"]
+
+
+def _case_rows(result: StoredSweep) -> list[Row]:
+    """Return rows about extreme peaks or velocities, and failures."""
     fine = result.completed
     failed = Counter(result["status"][~fine].tolist())
-    rows: list[Row] = [("cases", f"{len(result)}")]
+    rows: list[Row] = []
     if result.law:
         rows.append(("contact law", f"{result.law}, instead of EXPE"))
     if result.measured:
         rows.append(("measured", f"{', '.join(result.measured)}, which are not varied"))
+        rows += [(compared.name, str(compared)) for compared in comparisons(result)]
         rows += [(compared.name, str(compared)) for compared in comparisons(result)]
     if text := symmetry_text(result):
         rows.append(("symmetry", text))
@@ -87,12 +192,15 @@ def _extremes(result: StoredSweep) -> Iterator[Row]:
     shown = np.where(result.completed, result[names[0]], np.nan)
     if not np.isfinite(shown).any():
         return
-    for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
+    ends = {"smallest ": int(np.nanargmin(shown)), "largest ": int(np.nanargmax(shown))}
+    if len(set(ends.values())) == 1:
+        ends = {"": ends["largest "]}
+    for size, case in ends.items():
         texts = [quantity(result[name][case], result.unit(name), DIGITS) for name in names]
-        values = ", ".join(f"{name} {_shown(result, name, int(case))}" for name in result.cases)
+        values = ", ".join(f"{name} {_shown(result, name, case)}" for name in result.cases)
         values_text = f" ({values})" if values else ""
-        text = f"{', '.join(texts)}{values_text}{_found_band(result, int(case))}"
-        yield (f"{size} {what}", text)
+        text = f"{', '.join(texts)}{values_text}{_found_band(result, case)}"
+        yield (f"{size}{what}", text)
 
 
 def _found_band(result: StoredSweep, case: int) -> str:
@@ -115,12 +223,17 @@ def from_threshold_of(result: StoredSweep) -> str:
     return from_threshold(0 if card is None else int(card.number))
 
 
+def _is_at_threshold(result: StoredSweep) -> bool:
+    """Return whether a search has found the velocities at the delamination threshold."""
+    if not {"found_energy", THRESHOLD_FORCE} <= result.summary.keys():
+        return False
+    ratio = result["peak_force"][result.completed] / result[THRESHOLD_FORCE][result.completed]
+    return bool((np.abs(ratio - 1.0) < SAME_FORCE).all())
+
+
 def threshold_text(result: StoredSweep) -> str:
     """Say what the energies found at the threshold are; empty for other sweeps and searches."""
-    if not {"found_energy", THRESHOLD_FORCE} <= result.summary.keys():
-        return ""
-    ratio = result["peak_force"][result.completed] / result[THRESHOLD_FORCE][result.completed]
-    if not (np.abs(ratio - 1.0) < SAME_FORCE).all() or from_threshold_of(result) != AT_THE_LATEST:
+    if not _is_at_threshold(result) or from_threshold_of(result) != AT_THE_LATEST:
         return ""
     return (
         f"{AT_THE_LATEST} these energies, which are for one delamination; plies and interfaces may "
@@ -265,48 +378,93 @@ MAIN = (
 )
 
 
-def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
-    """Return lines about the main quantities: statistics, indices and probabilities."""
-    design, exceedance = random.design, random.exceedance
-    lines = [f"design            {design.kind}, {design.samples} samples, seed {design.seed}"]
-    lines += [
-        f"random            {column_name(name, unit(name))} {law}"
-        for name, law in design.laws.items()
-    ]
-    lines += [
-        f"correlation       {a}, {b} {value:.6g}"
-        for (a, b), value in pairs_of([*design.laws], design.correlation).items()
-        if value
-    ]
-    chosen = [name for name in MAIN if name in random.statistics][:MOST_PRINTED]
-    labels = ["mean", "std. dev.", *(f"{q:.0%}".replace("%", " %") for q in QUANTILES)]
+def random_tables(random: RandomResult, unit: Callable[[str], str]) -> Iterator[Table]:
+    """Yield tables: random values, then statistics, indices and probabilities."""
+    yield Table(tuple(_design_rows(random, unit)), title="Random values")
     count = len(next(iter(random.combinations.values()), [0]))
     for number in range(min(count, MOST_PRINTED)):
         place = (number,) if random.combinations else ()
-        lines += ["", *([random.label(number)] if place else [])]
-        moments = [random.statistics[name] for name in chosen]
-        rows = [[s.mean[place], s.standard_deviation[place], *s.quantiles[place]] for s in moments]
-        columns = [chosen, [unit(name) for name in chosen]]
-        columns += [[significant(value) for value in row] for row in zip(*rows, strict=True)]
-        lacking = [design.draws - int(s.draws[place]) for s in moments]
-        columns.append([str(count) for count in lacking] if any(lacking) else [""] * len(moments))
-        lines += [
-            f"{label:12}{''.join(f'{text:>16}' for text in row)}".rstrip()
-            for label, row in zip(["", "", *labels, "no value"], columns, strict=True)
-            if any(row)
-        ]
-        if random.sensitivity:
-            for name in (chosen[0], *(MARGIN if TOUGHNESS in design.laws else ())):
-                lines += ["", *_index_lines(random, name, place)]
-        for row, (name, limit) in enumerate(
-            zip(exceedance.quantity, exceedance.limit, strict=True)
-        ):
-            p, low, high, n, lacking = (values[(*place, row)] for values in exceedance[2:])
-            value = THRESHOLD if np.isnan(limit) else f"{limit:.6g}"
-            lines.append(f"P({name} > {value}) = {chance(p, low, high, lacking, design.draws - n)}")
+        label = f" of {random.label(number)}" if place else ""
+        yield replace(statistics_table(random, unit, place), title=f"Statistics{label}")
+        for name in _of_indices(random):
+            yield _index_table(random, name, place)
+        yield Table(tuple(_chance_rows(random, place)), title=f"Probabilities{label}")
     if count > MOST_PRINTED:
-        lines += ["", f"{count - MOST_PRINTED} more combinations of varied values are in the file"]
-    return lines
+        more = f"{count - MOST_PRINTED} more combinations of varied values are in the file"
+        yield Table((("", more),), title="Combinations")
+
+
+def _design_rows(random: RandomResult, unit: Callable[[str], str]) -> Iterator[Row]:
+    """Yield rows about the draws, the laws and their correlations."""
+    design = random.design
+    yield ("design", f"{design.kind}, {design.samples} samples, seed {design.seed}")
+    for name, law in design.laws.items():
+        yield ("random", f"{column_name(name, unit(name))} {law}")
+    for (a, b), value in pairs_of([*design.laws], design.correlation).items():
+        if value:
+            yield ("correlation", f"{a}, {b} {value:.6g}")
+
+
+def _main_quantities(random: RandomResult) -> list[str]:
+    """Return the names of the quantities that the summary shows."""
+    return [name for name in MAIN if name in random.statistics][:MOST_PRINTED]
+
+
+def statistics_table(
+    random: RandomResult, unit: Callable[[str], str], place: tuple[int, ...]
+) -> Table:
+    """Return the statistics of the main quantities in a combination of varied values."""
+    names = _main_quantities(random)
+    moments = [random.statistics[name] for name in names]
+    lacking = [random.design.draws - int(moment.draws[place]) for moment in moments]
+    columns = [
+        (moment.mean[place], moment.standard_deviation[place], *moment.quantiles[place])
+        for moment in moments
+    ]
+    labels = ("mean", "std. dev.", *(f"{q:.0%}".replace("%", " %") for q in QUANTILES))
+    rows: list[Row] = [
+        (label, *(ShownNumber(value, significant(value)) for value in values))
+        for label, values in zip(labels, map(tuple, zip(*columns, strict=True)), strict=True)
+    ]
+    if any(lacking):
+        rows.append(("no value", *(ShownNumber(count, str(count)) for count in lacking)))
+    return Table(tuple(rows), ("", *(column_name(name, unit(name)) for name in names)))
+
+
+def _of_indices(random: RandomResult) -> list[str]:
+    """Return the names of the quantities whose indices the summary shows."""
+    if not random.sensitivity:
+        return []
+    return [_main_quantities(random)[0], *(MARGIN if TOUGHNESS in random.design.laws else ())]
+
+
+def _index_table(random: RandomResult, name: str, place: tuple[int, ...]) -> Table:
+    """Return the indices of a quantity, with their 95 % intervals."""
+    columns = [values[place].tolist() for values in random.sensitivity[name]]
+    rows: list[Row] = []
+    for law, first, total, *intervals in zip(random.design.laws, *columns, strict=True):
+        texts = [
+            f"{value:.4f} ({low:.4f} to {high:.4f})"
+            for value, (low, high) in zip((first, total), intervals, strict=True)
+        ]
+        rows.append((law, *texts))
+    header = (name, "first-order index (95 %)", "total index (95 %)")
+    return Table(tuple(rows), header, f"Indices of {name}")
+
+
+def _chance_rows(random: RandomResult, place: tuple[int, ...]) -> Iterator[Row]:
+    """Yield rows of the probabilities that quantities exceed their limits."""
+    exceedance, draws = random.exceedance, random.design.draws
+    for row, (name, limit) in enumerate(zip(exceedance.quantity, exceedance.limit, strict=True)):
+        p, low, high, n, is_open = (values[(*place, row)] for values in exceedance[2:])
+        value = THRESHOLD if np.isnan(limit) else f"{limit:.6g}"
+        yield (f"P({name} > {value})", chance(p, low, high, is_open, draws - n))
+
+
+def _chances(random: RandomResult) -> list[str]:
+    """Return the probabilities of draws without varied values."""
+    rows = () if random.combinations else _chance_rows(random, ())
+    return [f"{label} = {text}" for label, text in rows]
 
 
 def chance(p: float, low: float, high: float, is_open: int, lacking: int) -> str:
@@ -319,16 +477,3 @@ def chance(p: float, low: float, high: float, is_open: int, lacking: int) -> str
     if lacking > is_open:
         text += f"; {lacking - is_open} draws have no value"
     return text
-
-
-def _index_lines(random: RandomResult, name: str, place: tuple[int, ...]) -> Iterator[str]:
-    laws = random.design.laws
-    width = max(12, *map(len, (name, *laws)))
-    yield f"{name:{width}}{'first-order index (95 %)':>29}{'total index (95 %)':>29}"
-    columns = [values[place].tolist() for values in random.sensitivity[name]]
-    for law, first, total, *intervals in zip(laws, *columns, strict=True):
-        texts = [
-            f"{value:.4f} ({low:.4f} to {high:.4f})"
-            for value, (low, high) in zip((first, total), intervals, strict=True)
-        ]
-        yield f"{law:{width}}{texts[0]:>29}{texts[1]:>29}"
