@@ -28,6 +28,7 @@ class Page:
     headings: list[str] = field(default_factory=list)
     captions: list[str] = field(default_factory=list)
     rows: list[list[Cell]] = field(default_factory=list)
+    terms: list[list[Cell]] = field(default_factory=list)  # of lists of names and values
     pictures: list[dict[str, str]] = field(default_factory=list)
     texts: list[str] = field(default_factory=list)
     addresses: list[str] = field(default_factory=list)
@@ -43,9 +44,14 @@ class Page:
         """The first row whose heading is this name, without it."""
         return next(row[1:] for row in self.rows if row[0].text == name)
 
+    def term(self, name: str) -> list[Cell]:
+        """The values of a name in the head."""
+        return next(row[1:] for row in self.terms if row[0].text == name)
+
     def numbers(self) -> Iterator[Cell]:
         """Cells with a number."""
-        return (cell for row in self.rows for cell in row if cell.value is not None)
+        rows = [*self.terms, *self.rows]
+        return (cell for row in rows for cell in row if cell.value is not None)
 
 
 class _Reader(HTMLParser):
@@ -55,6 +61,11 @@ class _Reader(HTMLParser):
         super().__init__()
         self.page = Page()
         self.open: list[str] = []
+
+    def _cell(self) -> Cell:
+        """The last cell, of a table or of a list of names and values."""
+        rows = self.page.terms if {"dt", "dd"} & set(self.open) else self.page.rows
+        return rows[-1][-1]
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         """Note an element."""
@@ -66,8 +77,12 @@ class _Reader(HTMLParser):
             self.page.rows.append([])
         if tag in ("td", "th"):
             self.page.rows[-1].append(Cell())
+        if tag == "dt":
+            self.page.terms.append([])
+        if tag in ("dt", "dd"):
+            self.page.terms[-1].append(Cell())
         if tag == "data":
-            self.page.rows[-1][-1].value = float(given["value"])
+            self._cell().value = float(given["value"])
         if tag == "img":
             self.page.pictures.append(given)
         if tag not in VOID:
@@ -82,8 +97,8 @@ class _Reader(HTMLParser):
         if {"style"} & set(self.open):
             return
         self.page.texts.append(data)
-        if {"td", "th"} & set(self.open):
-            self.page.rows[-1][-1].text += data
+        if {"td", "th", "dt", "dd"} & set(self.open):
+            self._cell().text += data
         elif self.open and self.open[-1] in ("h1", "h2", "h3"):
             self.page.headings.append(data)
         elif self.open and self.open[-1] == "caption":

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 import fecm
 from fecm import Result
-from fecm._table import Table
 from fecm.deck.layup import layup_text, parse_layup
 from fecm.deck.material_cards import Layer
 from fecm.judge.criteria import ALL_CRITERIA
@@ -24,7 +23,9 @@ from fecm.report.figures import stack
 from fecm.report.report import page_of
 from fecm.results.exposures import first_failures
 from fecm.results.metrics import METRICS
+from fecm.results.onset import energy_at_force
 from fecm.results.summary import run_summary
+from fecm.results.written import PageOptions
 from tests.calls import assert_unusable, call
 from tests.decks import LONG, ROOT, small
 from tests.pages import Page, agrees, read_page
@@ -33,6 +34,9 @@ from tests.test_first_failure import failing
 
 # A light projectile, whose contact ends within the run and passes the threshold.
 LIGHT = "PROJ\n    0    0     4.E-6\nDELA\n       .02\nEXPE"
+
+
+LIGHT_DECK = failing(steps=160).replace("EXPE", LIGHT, 1)
 
 
 def page(**results: fecm.Result | fecm.SweepResult) -> Page:
@@ -48,13 +52,14 @@ def _unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def _undrawn(_unrendered: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages without pictures of results."""
-    monkeypatch.setattr("fecm.report.figures.drawn", lambda *_, **__: iter(()))
+    for name in ("drawn", "force", "arranged"):
+        monkeypatch.setattr(f"fecm.report.figures.{name}", lambda *_, **__: iter(()))
 
 
 @pytest.fixture(scope="module")
 def failed() -> Result:
     """A run whose plies fail and whose force passes the threshold."""
-    return fecm.run_one(failing(steps=160).replace("EXPE", LIGHT, 1))
+    return fecm.run_one(LIGHT_DECK)
 
 
 @pytest.fixture(scope="module")
@@ -74,24 +79,52 @@ def test_every_number_of_a_page_is_the_one_beside_its_text(shown: Page) -> None:
 
 
 def test_the_metrics_of_a_page_are_those_of_the_result(failed: Result, shown: Page) -> None:
-    known = {name: value for name, value in failed.metrics.items() if np.isfinite(value)}
+    listed = {row[0].text.replace(" ", "_"): row[1] for row in shown.rows if len(row) == 3}
+    metrics = {name: failed.metrics[name] for name in METRICS if name in listed}
+    known = {name: value for name, value in metrics.items() if np.isfinite(value)}
     assert len(known) > 5
-    for name, value in known.items():
-        assert shown.row(name.replace("_", " "))[0].value == value
-    open_ones = [name for name in METRICS if name in failed.metrics and name not in known]
-    assert all(shown.row(name.replace("_", " "))[0].text == "–" for name in open_ones)
+    assert {name: listed[name].value for name in known} == known
+    assert all(listed[name].text == "–" for name in metrics.keys() - known.keys())
+
+
+def test_figures_of_the_first_sheet_are_those_of_the_result(failed: Result, shown: Page) -> None:
+    metrics, threshold = failed.metrics, float(failed.threshold["force"])
+    first = first_failures(failed)[0]
+    values = {name: shown.term(name)[0].value for name in (
+        "peak force", "delamination threshold", "energy for it", "contact", "first ply fails"
+    )}  # fmt: skip
+    assert values == {
+        "peak force": metrics["peak_force"],
+        "delamination threshold": threshold,
+        "energy for it": energy_at_force(failed, threshold),
+        "contact": metrics["contact_time"],
+        "first ply fails": first.force,
+    }
+    assert shown.term("first ply fails")[1].text == first.where
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_metrics_without_a_use_for_a_run_have_no_row(failed: Result) -> None:
+    """One contact of an elastic law keeps nothing and is the first, the last and the peak."""
+    elastic = re.sub(r"(?m)^ +1912000\..*$", "  1912000.       0.0       0.0       1.5", LIGHT_DECK)
+    names = {row[0].text for row in page(one=fecm.run_one(elastic)).rows}
+    useless = {"contacts", "peak contact", "first peak", "last contact", "contact loop"}
+    assert not names & {*useless, "permanent indentation"}
+    assert {"contact loop", "permanent indentation"} <= {
+        row[0].text for row in page(one=failed).rows
+    }
 
 
 def test_a_reader_of_the_page_alone_learns_what_happened(failed: Result, shown: Page) -> None:
     first = first_failures(failed)[0]
     text = shown.text
     for said in (
-        f"peak force {failed.force.max():.4g}",
+        "Delaminates: YES , at the latest from",
+        f"First failure: {first.where} , {first.mode} ({first.criterion.replace('_', ' ')}), from",
         "(elastic prediction; delamination is expected at the latest from 26.57, and the first ply "
         "fails before)",
-        "the threshold (delamination at the latest from 26.57) is reached at time",
-        "when the projectile has given up",
-        f"{first.mode} ({first.criterion.replace('_', ' ')}), {first.where}",
+        "reached at time",
+        "What limits these figures, worst first",
         "doubtful",
         "elements per bending wave",
         "the deck",
@@ -110,23 +143,21 @@ def test_a_criterion_that_reaches_1_below_the_threshold_is_named_beside_it(faile
     assert float(failed.threshold["force"]) < first.force < force < before.force.max()
     text = f"{first.criterion.replace('_', ' ')} reaches 1 before, at {first.force:.4g}"
     assert f"for one delamination, as in DELA; {text})" in "\n".join(run_summary(before))
-    assert (
-        f"(delamination at the latest from {force:.4g}; {text})"
-        in page_of({"run": before}).verdict[0]
-    )
+    assert page(run=before).row("criteria of plies and interfaces")[0].text == text
     assert "reaches 1 before" not in "\n".join(run_summary(failed))
 
 
 @pytest.mark.usefixtures("_undrawn")
-def test_verdict_and_table_of_a_page_name_one_ply_for_the_first_failure(failed: Result) -> None:
-    built = page_of({"failed": failed})
-    (results,) = (section for section in built.sections if section.title == "Results")
-    tables = {table.title: table for table in results.blocks if isinstance(table, Table)}
-    earliest, *_ = tables["First failure by criterion"].rows
-    criterion, mode, where = map(str, earliest[:3])
-    assert "first failure: " in built.verdict[0]
-    assert f"{mode} ({criterion}), {where}, at" in built.verdict[0]
-    assert "1 at time" not in tables["Largest exposures"].header
+def test_verdict_figure_and_table_of_a_page_name_one_ply_for_the_first_failure(
+    failed: Result,
+) -> None:
+    shown = page(failed=failed)
+    start = shown.rows.index(next(row for row in shown.rows if row[-1].text == "given up by then"))
+    criterion, mode, where = (cell.text for cell in shown.rows[start + 1][:3])
+    assert f"First failure: {where} , {mode} ({criterion}), from" in shown.text
+    assert shown.term("first ply fails")[1].text == where
+    (summary,) = (line for line in run_summary(failed) if line.startswith("first failure"))
+    assert f"{mode} ({criterion}), {where} at" in summary
 
 
 def test_exposures_of_a_page_are_those_of_the_result(failed: Result, shown: Page) -> None:
@@ -140,8 +171,11 @@ def test_exposures_of_a_page_are_those_of_the_result(failed: Result, shown: Page
 @pytest.mark.usefixtures("_unrendered")
 def test_what_a_run_lacks_has_no_heading() -> None:
     report_page = page(small=fecm.run_one(small()))
-    of_trust = ["Trust", "Notes of the run", "Warnings about the deck"]
-    assert report_page.headings[1:] == [*of_trust, "Results", "Pictures", "Model", "Provenance"]
+    assert report_page.headings[1:] == [
+        "What limits these figures, worst first",
+        "Assumptions and sources",
+        *("Trust", "Warnings about the deck", "Results", "Pictures", "Model", "Deck"),
+    ]
     absent = {"Delamination threshold", "Largest exposures", "Ply strengths"}
     assert not absent & set(report_page.captions)
     assert "not judged" in report_page.text
@@ -211,7 +245,7 @@ def test_a_result_without_a_readable_deck_has_a_page() -> None:
 def test_a_long_deck_is_cut_with_a_word(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fecm.report.content.MOST_TEXT", 300)
     result = fecm.run_one(small())
-    html = render(page_of({"small": result}))
+    html = render(page_of({"small": result}, options=PageOptions(full_deck=True)))
     kept, left = re.findall(r"<pre[^>]*>(.*)\n\.\.\. (\d+) more lines", html, re.DOTALL)[0]
     assert result.deck_text.startswith(kept)
     assert kept.count("\n") + 1 + int(left) == result.deck_text.count("\n")
@@ -531,14 +565,15 @@ def test_the_shear_stiffness_of_a_thick_laminate_is_doubtful(thickness: float, w
     assert page(one=fecm.run_one(deck)).row("transverse shear factor 1")[1].text == word
 
 
-@pytest.mark.usefixtures("_undrawn")
-@pytest.mark.parametrize(("most", "kind"), [(3, "svg+xml"), (2, "png")])
-def test_a_picture_of_more_bytes_than_allowed_is_made_of_pixels(
-    most: int, kind: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.usefixtures("_unrendered")
+@pytest.mark.parametrize(("most", "kinds"), [(10**9, {"svg+xml"}), (0, {"svg+xml", "png"})])
+def test_pictures_with_many_lines_are_made_of_pixels(
+    most: int, kinds: set[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fecm.report.figures.LARGEST", most)  # the picture's bytes are "svg"
+    """A mesh is a collection of lines, a history is a single one."""
+    monkeypatch.setattr("fecm.report.figures.LARGEST", most)
     html = render(page_of({"one": fecm.run_one(small())}))
-    assert set(re.findall(r"data:image/([a-z+]+);", html)) == {kind}
+    assert set(re.findall(r"data:image/([a-z+]+);", html)) == kinds
 
 
 @pytest.mark.usefixtures("_undrawn")

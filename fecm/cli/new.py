@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import shlex
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from click import option
 from click.core import ParameterSource
 
 from fecm._files import check_outputs
+from fecm._text import printable
 from fecm.authoring.deck_options import AUTO, ImpactOptions
 from fecm.authoring.new_deck import author
 from fecm.authoring.parameters import ObjectError
@@ -103,9 +105,34 @@ class PlateOptions:
         return Plate.on_fixture(fixture, self.mesh, grading=grading)
 
 
+ARGUMENTS = "fecm.arguments"  # of the command, in the context
+WIDTH = 98  # of comment lines
+
+
+class NewCommand(GroupedCommand):
+    """Command that knows its arguments as they were typed."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Keep the arguments, and parse them."""
+        ctx.meta[ARGUMENTS] = list(args)
+        return super().parse_args(ctx, args)
+
+
+def _command_comment(arguments: Sequence[str], output: Path) -> str:
+    """Return comment lines with the command that writes the deck again."""
+    words = [output.name if word == str(output) else word for word in arguments]
+    lines = ["! fecm new"]
+    for word in (shlex.quote(printable(word)) for word in words if word != "--overwrite"):
+        if len(lines[-1]) + len(word) > WIDTH:
+            lines[-1] += " \\"
+            lines.append("!  ")
+        lines[-1] += f" {word}"
+    return "\n".join([*lines, ""])
+
+
 @click.command(
     "new",
-    cls=GroupedCommand,
+    cls=NewCommand,
     groups=groups_of(ImpactOptions, LAST, FIRST),
     short_help="Write a deck from plate, layup, supports and impact.",
     epilog=typical(
@@ -247,7 +274,8 @@ def new_command(
         raise click.UsageError(as_options(str(error), context.params)) from None
     notes = [as_options(text, context.params) for text in (*authored.doubts, *authored.notes)]
     notes += _additions(authored.deck)
-    text = authored.comments + format_deck(authored.deck.to_text())
+    command = _command_comment(context.meta[ARGUMENTS], output)
+    text = command + authored.comments + format_deck(authored.deck.to_text())
     prepared = load_deck(text)
     if errors := prepared.errors():
         note(*(as_options(text, context.params) for text in authored.doubts))

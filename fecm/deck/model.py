@@ -120,6 +120,8 @@ class Deck(Record):
         Proportional loads, one for each PROP that reads one.
     text : str
         Cards of the problem as written, ended by STOP; empty for a deck built in Python.
+    comments : str
+        Comment lines above the title card; meaningless without `text`.
     """
 
     title: str
@@ -128,6 +130,7 @@ class Deck(Record):
     macros: tuple[Macro, ...]
     tables: tuple[LoadTable, ...] = ()
     text: str = field(default="", compare=False, repr=False)
+    comments: str = field(default="", compare=False, repr=False)
 
     def __repr__(self) -> str:
         sizes = f"{self.control.numnp} nodes, {self.control.numel} elements"

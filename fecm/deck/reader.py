@@ -241,6 +241,7 @@ class Reader:
             macros=tuple(macros),
             tables=tuple(tables),
             text="\n".join([*self.cards.text_since(first), STOP, ""]),
+            comments="\n".join(self.cards.comments_above(title)),
             source=CardSource(title),
         )
         return ParsedProblem(deck, unsound)

@@ -70,6 +70,14 @@ class CardStream:
         """Return the lines of the cards taken since a position."""
         return [line.rstrip() for _, line in self._cards[position : self.position]]
 
+    def comments_above(self, card: Card) -> list[str]:
+        """Return the comment lines directly above a card."""
+        last = card.line - 1
+        first = last
+        while first and self.lines[first - 1].startswith("!"):
+            first -= 1
+        return [line.rstrip() for line in self.lines[first:last]]
+
     def begins_segment(self, card: Card) -> bool:
         """Return whether a card is the keyword card of a segment, or ends the segments."""
         return card.keyword in self._keywords

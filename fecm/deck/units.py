@@ -37,6 +37,7 @@ PREFIXED = {
     "N*ms^2/mm": ("g", 0), "kN*ms^2/mm": ("g", 3),
 }  # fmt: skip
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # Dimensions.
 MASS = "force*time^2/length"
 MODULUS = "force/length^2"
@@ -185,6 +186,51 @@ def readable(value: float, unit: str, digits: int = DIGITS) -> tuple[int, str]:
         if name := with_prefix(unit, power):
             return power, name
     return 0, unit
+
+
+def prefixed(value: float, unit: str, digits: int = DIGITS) -> str:
+    """Format a value as :func:`quantity` does, with prefixes for times and forces too.
+
+    Examples
+    --------
+    >>> prefixed(0.002695, "s"), prefixed(7752.0, "N"), prefixed(150.0, "mm"), prefixed(86.2, "lbf")
+    ('2.695 ms', '7.752 kN', '150 mm', '86.2 lbf')
+    """
+    base, _ = PREFIXED.get(unit, ("", 0))
+    if base not in ("s", "N") or not 0.0 < abs(value) < math.inf:
+        return quantity(value, unit, digits)
+    power = thousands(float(f"{abs(value):.{digits}g}"))
+    name = with_prefix(unit, power)
+    return f"{significant(value / 10.0**power, digits)} {name}" if name else quantity(value, unit)
+
+
+def uncertain(value: float, error: float, unit: str = "") -> str:
+    """Format a value with its uncertainty in units of the last digit, in brackets.
+
+    The uncertainty has one digit, or two if they are less than 20. A value without a prefix of its
+    unit has a power of ten instead.
+
+    Examples
+    --------
+    >>> uncertain(52730.0, 710.0, "N/mm^1.5"), uncertain(7752.0, 101.0, "N"), uncertain(0.31, 0.02)
+    ('52.7(7)·10³ N/mm^1.5', '7.75(10) kN', '0.31(2)')
+    """
+    if not (0.0 < error < math.inf and 0.0 < abs(value) < math.inf):
+        return prefixed(value, unit)
+    power = thousands(abs(value))
+    base, _ = PREFIXED.get(unit, ("", 0))
+    name = with_prefix(unit, power) if base in ("s", "N", "g", "J") else ""
+    if not name:
+        name, power = unit, power if power > 0 or power < -3 else 0
+    size = error / 10.0**power
+    first = math.floor(math.log10(float(f"{size:.2g}")))
+    if float(f"{size:.2g}") < 2.0 * 10.0**first:
+        first -= 1
+    scale = max(0, -first)
+    mantissa = f"{round(value / 10.0**power, -first):.{scale}f}"
+    bracket = f"{round(size, -first) * 10.0**scale:.0f}"
+    times = "" if name != unit or not power else f"·10{str(power).translate(SUPERSCRIPTS)}"
+    return f"{mantissa}({bracket}){times} {name}".rstrip()
 
 
 def mass_in_si(mass: float, names: dict[str, str]) -> str:

@@ -29,6 +29,7 @@ class Judgement(NamedTuple):
     name: str
     size: Cell
     words: str = ""
+    noted: bool = False  # whether a run beyond the limit has a note about it too
 
 
 class Doubt(NamedTuple):
@@ -113,9 +114,8 @@ class ModelLimit(NamedTuple):
     ) -> Judgement:
         """Return what a page says of a size, by default in the words of the row."""
         level = self.level if beyond else TrustLevel.WITHIN
-        return Judgement(
-            level, quantity or self.quantity, size, self.page if words is None else words
-        )
+        text = self.page if words is None else words
+        return Judgement(level, quantity or self.quantity, size, text, noted=bool(self.note))
 
 
 # Limits of the model -----------------------------------------------------------------------------

@@ -89,14 +89,7 @@ def mesh_picture(
         heights, mean = [ratio, slender], 0.5 * (ratio + slender)
         figure, (axes, below) = style.panels(width, 2, ratio=mean, height_ratios=heights)
         _draw_rod(below, rod, place)
-    _colour_laminates(axes, result, name, cut)
-    sides = [cut.points[edge] for edge in cut.edges]
-    axes.add_collection(LineCollection(sides, colors="0.4", linewidths=0.4))
-    for support, nodes in support_masks(result).items():
-        if nodes.any():
-            x, y = coordinates[nodes, :2].T
-            axes.plot(x, y, ls="none", clip_on=False, label=support, **MARKS[support])
-    _mark_load(axes, result, name)
+    draw_plate(axes, result, name, cut)
     if at:
         x, y = np.array(at).T
         axes.plot(x, y, "D", clip_on=False, color=style.COLOURS[3], ms=3.5, label="points")
@@ -107,6 +100,20 @@ def mesh_picture(
         axes.set_title(_curved(result, name, place), loc="left")
     style.lines_legend(figure, axes)
     return Picture(figure)
+
+
+def draw_plate(
+    axes: Axes, result: Result, name: str, cut: data.Patches, colour: str = "0.4"
+) -> None:
+    """Draw elements with lines of a colour, supports, impact point and contact patch."""
+    _colour_laminates(axes, result, name, cut)
+    sides = [cut.points[edge] for edge in cut.edges]
+    axes.add_collection(LineCollection(sides, colors=colour, linewidths=0.4))
+    for support, nodes in support_masks(result).items():
+        if nodes.any():
+            x, y = result["mesh/coordinates"][nodes, :2].T
+            axes.plot(x, y, ls="none", clip_on=False, label=support, **MARKS[support])
+    _mark_load(axes, result, name)
 
 
 def _rod(result: Result, name: str) -> Rod:

@@ -28,7 +28,7 @@ from matplotlib.ticker import Formatter, Locator
 
 from fecm._text import printable
 from fecm._typing import Array
-from fecm.deck.units import PREFIXED, thousands, unit_of, with_prefix
+from fecm.deck.units import PREFIXED, SUPERSCRIPTS, thousands, unit_of, with_prefix
 from fecm.plot.kinds import PlotError, Width
 from fecm.results.result import Result
 
@@ -111,8 +111,6 @@ def save(figure: Figure, file: Path | IO[bytes], suffix: str, dpi: float) -> Non
             os.environ[DATE] = date
 
 
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
 # Decorator of functions that draw in this style.
 styled = cast(ContextDecorator, matplotlib.rc_context(RC))
 
@@ -190,8 +188,8 @@ def scale(peak: float, unit: str) -> AxisScale:
     if name := with_prefix(unit, power):
         return AxisScale(10.0**-power, name)
     text = f"{unit[2:]}⁻¹" if unit.startswith("1/") else unit
-    text = re.sub(r"\^(\d+)(?![\d.])", lambda match: match[1].translate(_SUPERSCRIPTS), text)
-    power_of_ten = f"10{str(power).translate(_SUPERSCRIPTS)} " if power else ""
+    text = re.sub(r"\^(\d+)(?![\d.])", lambda match: match[1].translate(SUPERSCRIPTS), text)
+    power_of_ten = f"10{str(power).translate(SUPERSCRIPTS)} " if power else ""
     return AxisScale(10.0**-power, f"{power_of_ten}{text.replace('*', '·')}".strip())
 
 

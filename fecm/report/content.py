@@ -24,7 +24,7 @@ from fecm._files import beside, check_outputs
 from fecm._table import Cell, Row, ShownNumber, Table
 from fecm._text import DIGITS, printable
 from fecm._version import __version__
-from fecm.deck.units import quantity
+from fecm.deck.units import prefixed
 from fecm.judge.limits import Judgement, TrustLevel
 from fecm.plot.pictures import require_matplotlib
 from fecm.results.written import PageOptions
@@ -101,6 +101,7 @@ class ReportPage(NamedTuple):
     verdict: tuple[str | Answer, ...]  # answers, and sentences
     level: TrustLevel  # the worst of the page
     sections: tuple[PageSection, ...]
+    subject: str = ""  # a sentence below the title
     headlines: tuple[Headline, ...] = ()
     first_sheet: tuple[PageBlock, ...] = ()  # below the headlines
     particulars: tuple[tuple[str, str], ...] = ()  # of the page, by name
@@ -110,7 +111,7 @@ class ReportPage(NamedTuple):
 def number_with_unit(value: float, unit: str = "", digits: int = DIGITS) -> Cell:
     """Return a number with its unit, or a dash if the number is not known."""
     return (
-        UNKNOWN if math.isnan(value) else ShownNumber(float(value), quantity(value, unit, digits))
+        UNKNOWN if math.isnan(value) else ShownNumber(float(value), prefixed(value, unit, digits))
     )
 
 

@@ -8,33 +8,50 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import colormaps, rc_context
-from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib import rc_context
 
 from fecm.deck.model import Layer
-from fecm.deck.units import quantity
+from fecm.deck.units import prefixed
 from fecm.plot.kinds import PictureKind, PlotError
 from fecm.plot.pictures import draw
-from fecm.plot.style import RC, panels
+from fecm.plot.style import RC, Look, panels
+from fecm.problem.problem import Problem
+from fecm.report.arrangement import arrangement, draw_stack
 from fecm.report.content import PageBlock, PagePicture, data_address
+from fecm.report.subject import impactor
+from fecm.results.exposures import first_failures
 from fecm.results.result import Result
+from fecm.results.summary import keeps_work
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 LARGEST = 150_000  # bytes of a drawing in lines, above which it becomes pixels
+BYTES_A_POINT = 30  # of a collection of paths in SVG
+FIRST: Look = {"marker": "o", "ms": 4.0, "mfc": "none", "color": "#C00000"}  # first failure
 DOTS = 200  # of pixels, per inch
 
 
 def inside(figure: Figure) -> str:
     """Return a figure as a ``data:`` address: SVG, or PNG where SVG would be large."""
-    data = _bytes(figure, "svg")
-    kind = "image/svg+xml"
-    if len(data) > LARGEST:
-        data, kind = _bytes(figure, "png"), "image/png"
-    return data_address(data, kind)
+    form, kind = ("png", "image/png") if _is_large(figure) else ("svg", "image/svg+xml")
+    return data_address(_bytes(figure, form), kind)
+
+
+def _is_large(figure: Figure) -> bool:
+    """Estimate whether a figure takes more than :data:`LARGEST` bytes as SVG.
+
+    Drawing it to know would take as long as the picture itself.
+    """
+    drawn = [part for axes in figure.axes for part in axes.collections]
+    points = sum(
+        np.shape(path.vertices)[0]
+        for part in drawn
+        if not part.get_rasterized()
+        for path in part.get_paths()
+    )
+    return bool(BYTES_A_POINT * points > LARGEST)
 
 
 def _bytes(figure: Figure, form: str) -> bytes:
@@ -44,6 +61,9 @@ def _bytes(figure: Figure, form: str) -> bytes:
     from fecm.plot.style import RC, save
 
     file = io.BytesIO()
+    if (engine := figure.get_layout_engine()) is not None:
+        engine.execute(figure)  # once; saving a figure with a layout engine draws it twice
+        figure.set_layout_engine(None)
     with matplotlib.rc_context(RC), warnings.catch_warnings(action="ignore"):
         save(figure, file, f".{form}", DOTS)
     return file.getvalue()
@@ -67,11 +87,49 @@ def drawn(
     yield PagePicture(inside(picture.figure), alternative or caption, caption, wide)
 
 
+def arranged(name: str, result: Result, problem: Problem) -> Iterator[PageBlock]:
+    """Yield the drawing of the test, unless the result lacks what it shows."""
+    hits = impactor(result, problem.deck)
+    if hits is None:
+        return
+    try:
+        figure = arrangement(name, result, problem, hits)
+    except PlotError:
+        return
+    caption = "The test to scale: plate, supports and load from above, a section, and the plies."
+    yield PagePicture(inside(figure), caption, caption)
+
+
+def forces(results: Mapping[str, Result]) -> Iterator[PageBlock]:
+    """Yield the contact forces of one or more runs in one picture."""
+    caption = _with_peaks("Contact force against time.", results)
+    yield from drawn(PictureKind.FORCE, results, caption)
+
+
+def force(name: str, result: Result) -> Iterator[PageBlock]:
+    """Yield the contact force of one run, with its first failure."""
+    with rc_context(RC), warnings.catch_warnings(action="ignore"):
+        try:
+            picture = draw(PictureKind.FORCE, {name: result})
+        except PlotError:
+            return
+        (axes, *_) = picture.figure.axes
+        for first in first_failures(result)[:1]:
+            axes.plot(first.time, first.force, **FIRST)
+            axes.annotate(
+                "first failure",
+                (first.time, first.force),
+                (6.0, -2.0),
+                textcoords="offset points",
+                va="top",
+            )
+    caption = _with_peaks("Contact force against time.", {name: result})
+    yield PagePicture(inside(picture.figure), caption, caption)
+
+
 def of_runs(results: Mapping[str, Result]) -> Iterator[PageBlock]:
-    """Yield the histories of one or more runs in the same pictures."""
+    """Yield other histories of one or more runs in the same pictures."""
     histories: tuple[tuple[PictureKind, str, dict[str, Any]], ...] = (
-        (PictureKind.FORCE, "Contact force against time.", {}),
-        (PictureKind.LOOP, "Contact force against indentation.", {"against": "indentation"}),
         (
             PictureKind.LOOP,
             "Contact force against the displacement of the projectile.",
@@ -81,17 +139,18 @@ def of_runs(results: Mapping[str, Result]) -> Iterator[PageBlock]:
         (PictureKind.STRAIN, "Surface strain against time.", {}),
     )
     for kind, caption, options in histories:
-        yield from drawn(kind, results, _with_peaks(kind, caption, results), **options)
+        yield from drawn(kind, results, caption, **options)
+    if any(keeps_work(result) for result in results.values()):
+        caption = "Contact force against indentation."
+        yield from drawn(PictureKind.LOOP, results, caption, against="indentation")
 
 
-def _with_peaks(kind: PictureKind, caption: str, results: Mapping[str, Result]) -> str:
+def _with_peaks(caption: str, results: Mapping[str, Result]) -> str:
     """Return a caption with the peak forces of the results."""
-    if kind != PictureKind.FORCE:
-        return caption
     peaks = []
     for name, result in results.items():
         if "history/force" in result and len(force := result.whole("history/force")):
-            size = quantity(float(force.max()), result.unit("force"))
+            size = prefixed(float(force.max()), result.unit("force"))
             peaks.append(f"{name}: {size}" if len(results) > 1 else size)
     return f"{caption[:-1]}; largest force {', '.join(peaks)}." if peaks else caption
 
@@ -103,53 +162,36 @@ def of_run(name: str, result: Result) -> Iterator[PageBlock]:
         time = float(result["history/time"][result["history/plate_w"].argmax()])
         stored = result["tape3/time"]
         near = float(stored[np.abs(stored - time).argmin()])
-        when = quantity(near, result.unit("time"))
+        when = prefixed(near, result.unit("time"))
         caption = f"Deflection at the stored time nearest to its peak, {when}"
         yield from drawn(PictureKind.CONTOUR, results, f"{caption}.", times=[near])
     yield from drawn(
         PictureKind.FAILURE,
         results,
         "Largest exposures over time: of the worst ply on the plate, and of every ply. "
-        "Hatched points under the load are left out.",
+        f"Hatched points under the load are left out.{_first_ply(result)}",
         wide=True,
         width="full",
     )
     yield from drawn(PictureKind.THICKNESS, results, "Ply stresses through the thickness.")
-    yield from drawn(PictureKind.MESH, results, "Mesh, supports, impact point and contact patch.")
 
 
-PERIOD = 180.0  # degrees after which a fibre direction repeats
-MOST_NAMED = 40  # plies that are labelled one by one
+def _first_ply(result: Result) -> str:
+    """Say where the first failure is, which may be in another ply than the largest exposure."""
+    if not (first := first_failures(result)[:1]):
+        return ""
+    return f" The first failure, before these values are reached, is in {first[0].where}."
+
+
 PLY_HEIGHT = 0.13  # of a label (in)
 WIDTH = 3.5  # of the figure (in)
 HEIGHTS = (1.5, 5.5)  # smallest and largest height of the plies (in)
 
 
 def stack(layers: Sequence[Layer], names: Mapping[int, str]) -> Figure:
-    """Draw the plies from the struck face down, to scale.
-
-    `names` has the names of the materials by number. They are left out if there is one material.
-    """
-    edges = np.concatenate([[0.0], np.cumsum([layer.thickness for layer in layers])])
-    several = len({layer.material for layer in layers}) > 1
+    """Draw the plies of a laminate; see :func:`~fecm.report.arrangement.draw_stack`."""
     height = float(np.clip(len(layers) * PLY_HEIGHT, *HEIGHTS)) + 0.3
-    colours = colormaps["twilight"]
     with rc_context(RC):
         figure, (axes,) = panels("column", ratio=height / WIDTH)
-        for layer, top, bottom in zip(layers, edges[:-1], edges[1:], strict=True):
-            colour = colours(0.15 + 0.7 * (layer.angle % PERIOD) / PERIOD)
-            axes.add_patch(
-                Rectangle((0.0, top), 1.0, bottom - top, fc=colour, ec="white", lw=0.5, alpha=0.6)
-            )
-            if len(layers) <= MOST_NAMED:
-                label = f"{layer.angle:g}°"
-                if several:
-                    label = f"{label}  {names.get(layer.material, layer.material)}"
-                middle = 0.5 * (top + bottom)
-                axes.text(0.5, middle, label, va="center", ha="center", fontsize=6.5)
-        axes.set_xlim(0.0, 1.0)
-        axes.set_ylim(edges[-1], 0.0)
-        axes.set_xticks([])
-        axes.spines["bottom"].set_visible(False)
-        axes.set_ylabel("depth from the struck face")
+        draw_stack(axes, layers, names, height)
     return figure

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,7 +24,6 @@ from fecm.deck.units import (
     unit_names,
     unit_of,
 )
-from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
 from fecm.problem.summary import rise_of
 from fecm.report.content import (
@@ -36,8 +33,8 @@ from fecm.report.content import (
     page_table,
 )
 from fecm.report.figures import inside, stack
+from fecm.report.subject import impactor, plate_extent
 from fecm.results.result import Result
-from fecm.results.run_metrics import impact_energy
 from fecm.results.stored import whole_plate
 from fecm.results.summary import radii_of
 
@@ -58,7 +55,10 @@ def of_problem(result: Result, problem: Problem) -> Iterator[PageBlock]:
     """Yield the tables and pictures of a problem."""
     deck = problem.deck
     yield from page_table(_plate(result, problem), title="Plate")
-    for number_of, layers in deck.layers.items():
+    struck = None if impactor(result, deck) is None else problem.laminate_number
+    for place, (number_of, layers) in enumerate(deck.layers.items()):
+        if place == struck:  # drawn on the first sheet
+            continue
         layup = layup_text([layer.angle for layer in layers])
         name = f"Laminate {number_of}: {layup}" if len(deck.layers) > 1 else f"Laminate {layup}"
         words = f"{name}, {len(layers)} plies, the struck face on top."
@@ -66,15 +66,6 @@ def of_problem(result: Result, problem: Problem) -> Iterator[PageBlock]:
     yield from _materials(deck)
     yield from page_table(_impact(result, deck), title="Projectile and contact")
     yield from page_table(_program(problem), title="Program")
-
-
-def plate_extent(problem: Problem) -> str:
-    """Return the extent of the plate as a text, of the whole plate for a symmetric part."""
-    unit = unit_of("length", unit_names(problem.deck))
-    places = problem.symmetry.unfolded(problem.mesh.coordinates[:, :2])
-    low, high = (f(places, axis=0) for f in (np.min, np.max))
-    a, b = (f"{side:.5g}" for side in high - low)
-    return f"{a} × {b} {unit}".rstrip()
 
 
 def _plate(result: Result, problem: Problem) -> Iterator[Row]:
@@ -106,9 +97,11 @@ def _plate(result: Result, problem: Problem) -> Iterator[Row]:
     if (cure := deck.last(model.Cure)) is not None:
         yield "cure", f"temperature difference {cure.delta_t:g}"
     for name in "ABD":
-        matrix = getattr(problem.laminate, name)
+        matrix = _rounded(getattr(problem.laminate, name))
+        if not matrix.any():
+            continue
         dimension = {"A": "force/length", "B": "force", "D": "force*length"}[name]
-        rows = "; ".join(" ".join(f"{value:.4g}" for value in row) for row in _rounded(matrix))
+        rows = "; ".join(" ".join(f"{value:.4g}" for value in row) for row in matrix)
         yield f"{name} ({unit_of(dimension, unit_names(deck)) or 'deck units'})", rows
 
 
@@ -153,33 +146,6 @@ def _headings(deck: model.Deck) -> dict[int, str]:
     names = {number: f"material {number}" for number in deck.plies}
     named = material_names(deck)
     return {n: name if named[n] == name else f"{n}: {named[n]}" for n, name in names.items()}
-
-
-class Impactor(NamedTuple):
-    """Projectile of a run. Slips and a user's projectile differ from the deck."""
-
-    name: str
-    mass: float
-    velocity: float
-    energy: float
-
-
-def impactor(result: Result, deck: model.Deck) -> Impactor | None:
-    """Return the projectile of a run, as it hits the whole plate; None without impact.
-
-    Its mass follows from the initial energy.
-    """
-    impact = deck.last(model.Impact)
-    if impact is None:
-        return None
-    projectile = build_projectile(deck)
-    mass, velocity = result.symmetry_factor * projectile.total_mass, impact.velocity
-    energy = impact_energy(result)
-    if math.isfinite(energy) and velocity:
-        mass = 2.0 * energy / velocity**2
-    user_projectile = result.attributes.get("projectile")
-    name = f"{user_projectile}, instead of PROJ" if user_projectile else projectile.kind
-    return Impactor(name, mass, velocity, 0.5 * mass * velocity**2)
 
 
 def _impact(result: Result, deck: model.Deck) -> Iterator[Row]:

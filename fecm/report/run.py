@@ -6,17 +6,15 @@ import hashlib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from fecm._table import Cell, Row, ShownNumber
 from fecm.deck import model
 from fecm.deck.layup import layup_text
-from fecm.deck.units import MASS, mass_in_si, quantity, unit_names, unit_of
-from fecm.judge.criteria import failure_in_words, spelt
+from fecm.deck.units import mass_in_si, prefixed, unit_names, unit_of
+from fecm.judge.criteria import spelt
 from fecm.judge.end import OPEN_PEAKS
-from fecm.judge.exposures import no_failure, on_this_mesh
 from fecm.judge.limits import Judgement, TrustLevel
 from fecm.judge.threshold import from_threshold
 from fecm.problem.problem import Problem
@@ -32,24 +30,25 @@ from fecm.report.content import (
     number_with_unit,
     page_table,
     sections,
+    share,
     worst,
 )
-from fecm.report.model import impactor, of_problem, plate_extent
+from fecm.report.first_sheet import answers, has_impact, headlines, limits, scene
+from fecm.report.model import of_problem
+from fecm.report.sources import assumptions, command_of, short_deck, sources
+from fecm.report.subject import impactor, plate_extent
 from fecm.report.trust import deck_problem, judgements
 from fecm.results.exposures import first_failures, largest_exposures, threshold_energy
-from fecm.results.metrics import INTEGERS, METRICS
+from fecm.results.metrics import INTEGERS, METRICS, THRESHOLD
+from fecm.results.onset import energy_at_force
 from fecm.results.result import Result
 from fecm.results.stored import whole_plate
 from fecm.results.summary import (
-    THRESHOLD_EVENT,
     elastic_doubt,
-    later_contact,
+    keeps_work,
     lowest_criterion,
     radii_of,
     run_table,
-    search_for,
-    threshold_in_words,
-    threshold_verdict,
 )
 from fecm.results.written import PageOptions
 
@@ -72,7 +71,7 @@ def run_page(
     digests : mapping of str to str
         SHA-256 of the files of results, by name; those in memory have none.
     options : PageOptions
-        Whether the deck is shown in full.
+        Whether the decks are shown in full.
     """
     loaded = {name: deck_problem(result) for name, result in results.items()}
     problems = {name: problem for name, (problem, _) in loaded.items()}
@@ -82,25 +81,16 @@ def run_page(
         level = TrustLevel.DOUBTFUL
     if len(results) == 1:
         ((name, result),) = results.items()
-        title = result.title or name
-        symmetry = whole_plate(result.symmetry_factor)
-        verdict = [
-            _sentence(result, problems[name]),
-            *([f"{symmetry[0].upper()}{symmetry[1:]}."] if symmetry else []),
-            WORDS[level],
-        ]
-        body = _single(name, result, *loaded[name], judged[name])
+        page = _single(name, result, *loaded[name], judged[name], level)
     else:
         title = f"{len(results)} impacts: {', '.join(results)}"
         sentences = (
             f"{name}: {_sentence(judgement, problems[name])}" for name, judgement in results.items()
         )
-        verdict = [*sentences, WORDS[level]]
         body = _several(results, problems, judged)
-    provenance = _provenance(results, digests)
-    return ReportPage(
-        title, tuple(verdict), level, (*body, *sections([("Provenance", provenance)]))
-    )
+        page = ReportPage(title, (*sentences, WORDS[level]), level, body)
+    last = sections([("Deck", _decks(results, digests, full=options.full_deck))])
+    return page._replace(sections=(*page.sections, *last))
 
 
 def _single(
@@ -109,20 +99,47 @@ def _single(
     problem: Problem | None,
     warnings: list[str],
     judged: list[Judgement],
-) -> tuple[PageSection, ...]:
-    """Return the sections about one result."""
+    level: TrustLevel,
+) -> ReportPage:
+    """Return the page about one result, without its deck."""
     named = {name: result}
     trust: list[PageBlock] = [Judgements(tuple(judged))] if judged else []
-    trust += note_list(result.notes, "Notes of the run")
     trust += note_list(warnings, "Warnings about the deck")
-    return sections(
+    if not has_impact(result):
+        trust += note_list(result.notes, "Notes of the run")
+    body = sections(
         [
+            ("Assumptions and sources", _sources(result, problem)),
             ("Trust", trust),
             ("Results", [*_results(named), *_threshold(result), *_criteria(result)]),
             ("Pictures", [*figures.of_runs(named), *figures.of_run(name, result)]),
             ("Model", [] if problem is None else of_problem(result, problem)),
         ]
     )
+    page = ReportPage(result.title or name, ("No impact: see Results.",), level, body)
+    if not has_impact(result):
+        return page
+    symmetry = whole_plate(result.symmetry_factor)
+    parts = [] if problem is None else [scene(result, problem)]
+    subject = "; ".join(filter(None, [*parts, symmetry]))
+    return page._replace(
+        verdict=tuple(answers(result)),
+        subject=f"{subject[0].upper()}{subject[1:]}." if subject else "",
+        headlines=tuple(headlines(result, problem)),
+        first_sheet=(
+            *([] if problem is None else figures.arranged(name, result, problem)),
+            *figures.force(name, result),
+            *note_list(limits(result.notes, judged), "What limits these figures, worst first"),
+        ),
+    )
+
+
+def _sources(result: Result, problem: Problem | None) -> list[PageBlock]:
+    """Return what the model assumes, and the sources of its constants."""
+    if problem is None:
+        return []
+    table = page_table(sources(result, problem), ("constants", "source"), "Sources")
+    return [*note_list(assumptions(result, problem)), *table]
 
 
 def _several(
@@ -155,7 +172,7 @@ def _common_pictures(results: Mapping[str, Result]) -> list[PageBlock]:
     """Draw the histories of all results in the same pictures, if their units are the same."""
     if len({tuple(result.units.items()) for result in results.values()}) > 1:
         return note_list(["The results have different units: they have no pictures in common."])
-    return list(figures.of_runs(results))
+    return [*figures.forces(results), *figures.of_runs(results)]
 
 
 def _model_row(result: Result, problem: Problem | None) -> dict[str, Cell]:
@@ -187,58 +204,19 @@ def _model_row(result: Result, problem: Problem | None) -> dict[str, Cell]:
 
 def _sentence(result: Result, problem: Problem | None) -> str:
     """Say in one sentence what hit what, and what happened."""
-    in_units = partial(_format_quantity, result)
-    if "history/force" not in result or not len(result["history/force"]):
+    if not has_impact(result):
         return "No impact: see Results."
-    force, time = result.whole("history/force"), result["history/time"]
-    peak = int(force.argmax())
-    parts = []
-    if force[peak] > 0.0:
+    force = float(result.whole("history/force").max())
+    parts = ["there was no contact"]
+    if force > 0.0:
         at_least = "at least " if result.end in OPEN_PEAKS else ""
-        size = f"{at_least}{in_units(force[peak], 'force')} at {in_units(time[peak], 'time')}"
-        size += later_contact(result)
-        doubt = elastic_doubt(result, float(force[peak]))
-        parts.append(f"peak force {size} ({doubt})" if doubt else f"peak force {size}")
-    else:
-        parts.append("there was no contact")
-    if result.threshold:
-        limit = "; ".join([f"delamination {threshold_in_words(result)}", *lowest_criterion(result)])
-        parts.append(f"the threshold ({limit}) is {threshold_verdict(result)}")
-        if math.isfinite(float(result.threshold["time"])):
-            parts.append(search_for(*THRESHOLD_EVENT))
-    largest = largest_exposures(result)
-    if first := first_failures(result)[:1]:
-        failure = first[0]
-        words = failure_in_words(failure.criterion, failure.mode, failure.where)
-        text = f"first failure: {on_this_mesh(largest)}{words}"
-        if not math.isnan(failure.force):
-            energy = in_units(failure.energy, "force*length")
-            at_force = in_units(failure.force, "force")
-            text = f"{text}, at {at_force}, when the projectile has given up {energy}"
-        parts.append(text)
-    elif largest:
-        parts.append(f"first failure: {no_failure(largest, result.end)}")
-    if problem is None:
-        text = "; ".join(parts)
-        return f"{text[0].upper()}{text[1:]}."
-    return f"{_scene(result, problem)}: {'; '.join(parts)}."
-
-
-def _scene(result: Result, problem: Problem) -> str:
-    """Say what hits what, and how hard."""
-    deck, units = problem.deck, unit_names(problem.deck)
-    hits = impactor(result, deck)
-    if hits is None:
-        return "An impact"
-    weight = mass_in_si(hits.mass, units) or quantity(hits.mass, unit_of(MASS, units))
-    speed = f"{hits.velocity:.4g} {unit_of('length/time', units)}".rstrip()
-    energy = quantity(hits.energy, unit_of("force*length", units))
-    layup = layup_text([layer.angle for layer in deck.require(model.Material).layers])
-    thickness = f"{problem.laminate.thickness:.4g} {unit_of('length', units)}".rstrip()
-    return (
-        f"A mass of {weight} at {speed} ({energy}) on a plate of {plate_extent(problem)}, "
-        f"{thickness} of {layup}"
-    )
+        doubt = elastic_doubt(result, force)
+        size = prefixed(force, unit_of("force", result.units))
+        parts = [f"peak force {at_least}{size}{f' ({doubt})' if doubt else ''}"]
+    parts += [f"{question.lower()}: {answer}{rest}" for question, answer, rest in answers(result)]
+    if problem is not None and (text := scene(result, problem)):
+        return f"{text}: {'; '.join(parts)}."
+    return f"{'; '.join(parts)}."
 
 
 def _results(results: Mapping[str, Result]) -> list[PageBlock]:
@@ -255,12 +233,13 @@ def _results(results: Mapping[str, Result]) -> list[PageBlock]:
 def _metrics(results: Mapping[str, Result]) -> list[PageBlock]:
     """Return a table of impact metrics with a column for each result."""
     metrics = {name: result.metrics for name, result in results.items()}
+    useless = {name: _useless(result, alone=len(results) == 1) for name, result in results.items()}
     rows: list[Row] = []
     if any(result.end in OPEN_PEAKS for result in results.values()):
         bounds = [_lower_bound(result) for result in results.values()]
         rows.append(("largest force by the end", *bounds, "lower bound of the peak force"))
     for key, (description, dimension) in METRICS.items():
-        if not any(key in run_metrics for run_metrics in metrics.values()):
+        if all(key not in metrics[name] or key in useless[name] for name in results):
             continue
         cells: list[Cell] = []
         for name, result in results.items():
@@ -274,6 +253,18 @@ def _metrics(results: Mapping[str, Result]) -> list[PageBlock]:
             description = f"{description}{_elastic_peaks(results)}"
         rows.append((key.replace("_", " "), *cells, description))
     return page_table(rows, ("metric", *(results if len(results) > 1 else ("value",)), "meaning"))
+
+
+def _useless(result: Result, *, alone: bool) -> set[str]:
+    """Return the metrics that say nothing about a run, or that a page of it has elsewhere."""
+    metrics = result.metrics
+    names = {*THRESHOLD} if alone else set()
+    if metrics.get("contacts") == 1:
+        names |= {"contacts", "peak_contact", "first_peak", "last_contact"}
+    if metrics and not keeps_work(result):
+        names |= {"contact_loop"}
+        names |= {"permanent_indentation"} if metrics["permanent_indentation"] == 0.0 else set()
+    return names
 
 
 def _elastic_peaks(results: Mapping[str, Result]) -> str:
@@ -314,8 +305,16 @@ def _threshold(result: Result) -> list[PageBlock]:
             ("one delamination in each interface of unlike plies", low),
             ("a single delamination", high),
         ]
+    rows += [("criteria of plies and interfaces", text) for text in lowest_criterion(result)]
+    metrics = result.metrics
+    rows.append(("1 less the largest force over it", share(metrics["threshold_margin"])))
+    if math.isfinite(energy := energy_at_force(result, float(threshold["force"]))):
+        shown = number_with_unit(energy, unit_of("force*length", result.units))
+        rows.append(("energy of the impact that reaches it, about", shown))
     reached = float(threshold["time"])
     if math.isfinite(reached):
+        above = number_with_unit(metrics["time_above"], unit_of("time", result.units))
+        rows.append(("time at or above it", above))
         rows.append(("reached at time", number_with_unit(reached, unit_of("time", result.units))))
         rows.append(
             (
@@ -368,7 +367,9 @@ def _criteria(result: Result) -> list[PageBlock]:
     ]
 
 
-def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> Iterator[PageBlock]:
+def _decks(
+    results: Mapping[str, Result], digests: Mapping[str, str], *, full: bool
+) -> Iterator[PageBlock]:
     """Yield version, solver, checksums, and the decks."""
     texts = {name: result.deck_text for name, result in results.items()}
     rows: dict[str, list[Cell]] = {
@@ -385,10 +386,8 @@ def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> It
         ("property", *results) if len(results) > 1 else (),
         "Versions and checksums",
     )
-    for name, text in texts.items():
-        yield listing("The deck" if len(texts) == 1 else f"The deck of {name}", text)
-
-
-def _format_quantity(result: Result, value: float, dimension: str) -> str:
-    """Format a value with the unit of its dimension."""
-    return quantity(float(value), unit_of(dimension, result.units))
+    for name, result in results.items():
+        text, whose = result.deck_text, f" of {name}" if len(texts) > 1 else ""
+        if command := command_of(result):
+            yield listing(f"The command that wrote the deck{whose}", command)
+        yield listing(f"The deck{whose}", text if full else short_deck(text))

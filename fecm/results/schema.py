@@ -56,6 +56,7 @@ class Kinematics(StrEnum):
 
 
 KINEMATICS = "kinematics"
+COMMENTS = "comments"  # attribute of a run: comment lines above the title of its deck
 
 
 def heading(form: Form, title: str) -> dict[str, Any]:

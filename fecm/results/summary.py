@@ -546,10 +546,18 @@ def _rebound(result: Stored) -> str:
     return f"{velocity}, impulse {_quantity(result, metrics['impulse'], 'force*time')}"
 
 
+def keeps_work(result: Stored) -> bool:
+    """Return whether the indentation keeps work, beyond rounding; an elastic law keeps none."""
+    work = metrics_of(result).get("contact_loop", math.nan)
+    if math.isnan(work):
+        return False
+    return bool(abs(work) > np.abs(result.whole("energy/balance_error")).max(initial=0.0))
+
+
 def _contact_loop(result: Stored) -> list[Row]:
     """Return the row of the work that the indentation keeps, which an elastic law does not."""
     work = metrics_of(result)["contact_loop"]
-    if not abs(work) > np.abs(result.whole("energy/balance_error")).max():
+    if not keeps_work(result):
         return []
     share = f"{work / impact_energy(result):.1%} of the impact energy"
     kept = _quantity(result, work, "force*length")

@@ -25,7 +25,7 @@ from fecm.problem.problem import Problem, Threshold
 from fecm.results.exposures import AT_REST, count_evaluations
 from fecm.results.metrics import VALIDITY
 from fecm.results.result import Result
-from fecm.results.schema import KINEMATICS, Form, Kinematics, heading
+from fecm.results.schema import COMMENTS, KINEMATICS, Form, Kinematics, heading
 from fecm.results.sinks import ReadOnce, Sink
 from fecm.simulation.decision import history_attributes, symmetry_attributes
 from fecm.simulation.macros import STORING, bind, bind_loop
@@ -89,6 +89,7 @@ def _write_header(simulation: Simulation) -> None:
         "solver": simulation.model.motion.solver,
         **({KINEMATICS: Kinematics.VON_KARMAN.value} if plate.nonlinear else {}),
         **options.rod_method.attributes,
+        **_comments(deck),
         **_own_parts(options),
         **_units(deck),
         **symmetry_attributes(simulation.problem),
@@ -99,6 +100,15 @@ def _write_header(simulation: Simulation) -> None:
     at_nodes = points < 0 and plate.rules.strains is nodal(-points)
     simulation.recorder.create("nodes" if at_nodes else "gauss")
     _write_cure(simulation)
+
+
+MOST_COMMENTS = 10_000  # characters; an attribute of HDF5 has 64 KB
+
+
+def _comments(deck: Deck) -> dict[str, str]:
+    """Return the comments above the title of a deck that is as it was written."""
+    comments = deck.comments[:MOST_COMMENTS] if deck.text else ""
+    return {COMMENTS: comments} if comments else {}
 
 
 def _own_parts(options: RunOptions) -> dict[str, str]:
