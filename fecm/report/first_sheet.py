@@ -81,7 +81,10 @@ def _delamination(result: Result) -> tuple[str, str]:
     words = from_threshold(result.threshold.get("number"))
     if largest > THRESHOLD.value * force:
         at_force = _headline(result, force, "force")
-        return "YES", f", {words} {at_force if math.isnan(energy) else _energy(result, energy)} on."
+        return (
+            "YES",
+            f", {words} {at_force if math.isnan(energy) else f'about {_energy(result, energy)}'} on.",
+        )
     answer = "OPEN" if result.end in OPEN_PEAKS else "NO"
     return answer, f", the threshold is {threshold_verdict(result)}."
 
@@ -99,7 +102,7 @@ def _first_ply(result: Result) -> tuple[str, str]:
             f": {no_failure(largest, result.end)}." if is_open else ".",
         )
     energy = energy_at_force(result, first.force)
-    from_energy = "" if math.isnan(energy) else f", from {_energy(result, energy)} on"
+    from_energy = "" if math.isnan(energy) else f", from about {_energy(result, energy)} on"
     on_mesh = f"; {FINER_MESHES_DECIDE}" if is_open else ""
     words = f"{first.mode} ({spelt(first.criterion)})"
     return first.where, f", {words}{from_energy}{on_mesh}."

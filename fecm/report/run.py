@@ -12,7 +12,7 @@ import numpy as np
 from fecm._table import Cell, Row, ShownNumber
 from fecm.deck import model
 from fecm.deck.layup import layup_text
-from fecm.deck.units import mass_in_si, prefixed, unit_names, unit_of
+from fecm.deck.units import mass_in_si, unit_names, unit_of
 from fecm.judge.criteria import spelt
 from fecm.judge.end import OPEN_PEAKS
 from fecm.judge.limits import Judgement, TrustLevel
@@ -48,6 +48,7 @@ from fecm.results.summary import (
     keeps_work,
     lowest_criterion,
     radii_of,
+    run_answer,
     run_table,
 )
 from fecm.results.written import PageOptions
@@ -206,17 +207,8 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     """Say in one sentence what hit what, and what happened."""
     if not has_impact(result):
         return "No impact: see Results."
-    force = float(result.whole("history/force").max())
-    parts = ["there was no contact"]
-    if force > 0.0:
-        at_least = "at least " if result.end in OPEN_PEAKS else ""
-        doubt = elastic_doubt(result, force)
-        size = prefixed(force, unit_of("force", result.units))
-        parts = [f"peak force {at_least}{size}{f' ({doubt})' if doubt else ''}"]
-    parts += [f"{question.lower()}: {answer}{rest}" for question, answer, rest in answers(result)]
-    if problem is not None and (text := scene(result, problem)):
-        return f"{text}: {'; '.join(parts)}."
-    return f"{'; '.join(parts)}."
+    what = "" if problem is None else scene(result, problem)
+    return f"{': '.join(filter(None, [what, run_answer(result)]))}."
 
 
 def _results(results: Mapping[str, Result]) -> list[PageBlock]:
