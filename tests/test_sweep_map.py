@@ -328,31 +328,55 @@ def test_cases_still_in_contact_are_crossed_and_counted(vary: dict[str, list[flo
         plot(sweep, "impulse")
 
 
-@pytest.mark.parametrize(
-    ("over", "where", "sign", "marker"),
-    [
-        (("velocity",), {"k": 1e6}, "\N{WHITE CIRCLE}", "o"),
-        (("velocity", "k"), None, "/", "$/$"),
-    ],
-)
+WORDS = "beyond the linear plate and a few other limits of the model (w > 0.3 h)"
+
+
+@pytest.fixture
+def doubtful(plane: SweepResult, monkeypatch: pytest.MonkeyPatch) -> NDArray[np.bool_]:
+    """Cases of the plane that a picture takes as beyond the range of the model."""
+    fast = plane["velocity"] > 60.0
+    monkeypatch.setattr("fecm.plot.maps.beyond", lambda _, rows: {WORDS: fast[rows]})
+    return np.asarray(fast)
+
+
+@pytest.mark.usefixtures("doubtful")
 def test_the_line_of_doubtful_cases_begins_with_their_mark_and_is_not_cut(
     plane: SweepResult,
-    over: tuple[str, ...],
-    where: dict[str, float] | None,
-    sign: str,
-    marker: str,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    doubtful = plane["velocity"] > 60.0
-    words = "beyond the linear plate and a few other limits of the model (w > 0.3 h)"
-    monkeypatch.setattr("fecm.plot.maps.beyond", lambda _, rows: {words: doubtful[rows]})
-    figure = plot(plane, over=over, where=where)
-    *_, marks = (line for line in figure.axes[0].get_lines() if line.get_marker() == marker)
-    count = len(data_of(marks)[0])
-    assert count == (2 if where else 8)
-    cases = 3 if where else 12
+    figure = plot(plane, over="velocity", where={"k": 1e6})
+    *_, marks = (line for line in figure.axes[0].get_lines() if line.get_marker() == "o")
+    assert len(data_of(marks)[0]) == 2
     line = " ".join(footer_of(figure).split())
-    assert line == f"{sign} {words}: {count} of {cases} cases"
+    assert line == f"\N{WHITE CIRCLE} {WORDS}: 2 of 3 cases"
+
+
+def test_doubtful_cells_are_hatched_as_one_area_that_covers_them(
+    plane: SweepResult, doubtful: NDArray[np.bool_]
+) -> None:
+    figure = plot(plane, over=("velocity", "k"))
+    (area,) = figure.axes[0].patches
+    assert area.get_hatch()
+    cells = zip(plane["velocity"], plane["k"], strict=True)
+    inside = [area.get_path().contains_point(cell) for cell in cells]
+    assert inside == doubtful.tolist()
+    # Four rows of k, 4e6 high with their halves at both ends, from 75 to 175 in/s.
+    corners = np.asarray(area.get_path().vertices)
+    assert (corners.min(axis=0).tolist(), corners.max(axis=0).tolist()) == (
+        [75.0, 0.5e6],
+        [175.0, 4.5e6],
+    )
+    assert " ".join(footer_of(figure).split()) == f"hatched: {WORDS}: 8 of 12 cases"
+
+
+def test_a_map_over_mass_and_velocity_has_lines_of_equal_energy() -> None:
+    sweep = fecm.sweep(NAMED, {"mass": [1e-4, 2e-4, 3e-4], "velocity": VELOCITIES})
+    (axes, _) = plot(sweep).axes
+    lines = next(c for c in axes.collections if getattr(c, "levels", None) is not None
+                 and c.get_edgecolor()[0][:3].tolist() == [0.0, 0.0, 0.0])  # fmt: skip
+    for level, path in zip(lines.levels, lines.get_paths(), strict=True):
+        mass, velocity = np.asarray(path.vertices).T
+        np.testing.assert_allclose(0.5 * mass * velocity**2, level, rtol=5e-3)
+    assert "equal energy" in [line.get_label() for line in axes.get_lines()]
 
 
 def test_a_quantity_that_no_case_has_yet_is_refused() -> None:

@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from fecm._errors import warn
-from fecm._typing import Array, Bools, Floats, Indices
+from fecm._typing import Bools, Floats, Indices
 from fecm.plot import style
 from fecm.plot.kinds import Picture, PlotError, Width
+from fecm.plot.map_cells import ValueGrid, draw_equal_energies, hatch, value_grid
 from fecm.plot.sweep_data import (
     DrawnVariable,
     Where,
@@ -76,25 +77,6 @@ class Graph(NamedTuple):
         self.x.mark(self.axes.xaxis)
         if not self.y.ticks:
             self.y.mark(self.axes.yaxis)
-
-
-class ValueGrid(NamedTuple):
-    """Quantity on a full grid of two parameters."""
-
-    x: Array  # (nx,), ascending
-    y: Array  # (ny,), ascending
-    values: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]  # (ny, nx); masked: no value
-
-
-def value_grid(x: DrawnVariable, y: DrawnVariable, values: Floats) -> ValueGrid | None:
-    """Return the values of all cases as a full grid; None if the cases do not form one."""
-    columns, column = np.unique(x.values, return_inverse=True)
-    rows, row = np.unique(y.values, return_inverse=True)
-    places = row * len(columns) + column
-    if not np.array_equal(np.sort(places), np.arange(len(columns) * len(rows))):
-        return None
-    ordered = values[np.argsort(places)].reshape(len(rows), len(columns))
-    return ValueGrid(columns, rows, np.ma.masked_invalid(ordered))
 
 
 def choose(
@@ -460,8 +442,8 @@ AROUND = 0.75
 BAR = 0.45
 FEWEST_ROWS = 4  # rows for which there is room at least
 MARK: style.Look = {"color": "0.25", "ms": 3.5, "ls": "none", "zorder": 4, "clip_on": False}
-# Marks of cases beyond the range of the model, on colours and around the points of a graph.
-HATCHING = MARK | {"marker": "$/$", "mew": 0.0}
+# Marks of cases beyond the range of the model, on coloured points and around points of a graph.
+ON_POINT = MARK | {"marker": "$/$", "mew": 0.0}
 AROUND_POINT = MARK | {"marker": "o", "mfc": "none", "mew": 0.6, "ms": 5.5}
 
 
@@ -490,11 +472,11 @@ def parameter_map(
     contents = choose(sweep, name, quantity=quantity, over=over, where=where or {}, level=level)
     graph = _draw(contents, width)
     by_colours = contents.shown is not graph.x and contents.shown is not graph.y
-    beyond, sign = (HATCHING, "/") if by_colours else (AROUND_POINT, "\N{WHITE CIRCLE}")
-    lines = [
-        *_mark_cases(graph, contents.ended, MARK | {"marker": "x"}, "\N{MULTIPLICATION SIGN}"),
-        *_mark_cases(graph, contents.beyond, beyond, sign),
-    ]
+    crosses = MARK | {"marker": "x"}
+    lines = _mark_cases(graph, contents.ended, crosses, "\N{MULTIPLICATION SIGN}")
+    lines += _mark_beyond(graph, contents.beyond, by_colours=by_colours)
+    if by_colours:
+        draw_equal_energies(graph.axes, sweep, graph.x, graph.y)
     style.footer(graph.axes, lines)
     if len(contents.thresholds):
         (mark_threshold_contours if by_colours else mark_threshold_curves)(graph, contents)
@@ -533,9 +515,22 @@ def _draw(contents: MapContents, width: Width) -> Graph:
     return graph
 
 
+def _mark_beyond(graph: Graph, masks: Mapping[str, Bools], *, by_colours: bool) -> list[str]:
+    """Mark cases beyond the range of the model; return lines that count them by reason."""
+    if not by_colours:
+        return _mark_cases(graph, masks, AROUND_POINT, "\N{WHITE CIRCLE}")
+    if masks and hatch(graph.axes, graph.x, graph.y, _any_of(masks)):
+        return case_counts(masks, "hatched: ")
+    return _mark_cases(graph, masks, ON_POINT, "/")
+
+
 def _mark_cases(graph: Graph, masks: Mapping[str, Bools], look: style.Look, sign: str) -> list[str]:
     """Mark cases; return lines that count them by reason. `sign` is the mark as text."""
     if masks:
-        is_marked = np.logical_or.reduce(list(masks.values()))
+        is_marked = _any_of(masks)
         graph.axes.plot(graph.x.values[is_marked], graph.y.values[is_marked], **look)
     return case_counts(masks, f"{sign} ")
+
+
+def _any_of(masks: Mapping[str, Bools]) -> Bools:
+    return np.asarray(np.logical_or.reduce(list(masks.values())))
