@@ -397,6 +397,30 @@ def test_a_threshold_of_the_deck_is_a_limit(folder: Path) -> None:
     assert swept.random.exceedance.limit == swept["threshold_force"][:1]
 
 
+@pytest.mark.parametrize(
+    ("law", "ends"), [("velocity=uniform:20,115", 1), ("giic=uniform:0.5,1.5", 2)]
+)
+def test_the_picture_draws_the_thresholds_of_the_deck_without_being_asked(
+    law: str, ends: int
+) -> None:
+    pytest.importorskip("matplotlib")
+    from fecm.plot.pictures import draw
+
+    deck = QUICK.replace("EXPE", "DELA\n1.\nEXPE")
+    swept = fecm.sweep(deck, random=[law], samples=16)
+    picture = draw("exceedance", {"one": swept})
+    (axes,) = picture.figure.axes
+    marks: Any = [line for line in axes.get_lines() if "delamination" in str(line.get_label())]
+    drawn = [line.get_xdata()[0] for line in marks if len(line.get_xdata())]
+    for area in axes.patches:
+        drawn += area.get_extents().transformed(axes.transData.inverted()).intervalx.tolist()
+    thresholds = swept["threshold_force"]
+    assert drawn == pytest.approx([thresholds.min(), thresholds.max()][:ends])
+    share = (swept["peak_force"] > thresholds).mean()
+    assert f") = {share:.4g} (" in picture.notes[0]
+    assert picture.notes[0].split(" (")[0] in " ".join(footer_of(picture.figure).split())
+
+
 def test_impossible_draws_are_failed_cases_and_their_share_is_told(folder: Path) -> None:
     done = sweep(folder, *NORMAL)
     failed = int((fecm.load_sweep(folder / "new.h5")["k"] <= 0.0).sum())
@@ -540,7 +564,7 @@ def test_the_line_of_doubtful_draws_is_not_cut(
     loaded = fecm.load_sweep(folder / "one.h5")
     figure = draw(kind, {"one": loaded}, **options).figure
     text = " ".join(footer_of(figure).split())
-    assert re.fullmatch(rf"{re.escape(words)}: (\d+) of \1 cases", text)
+    assert re.fullmatch(rf"(P\(.*\) )?{re.escape(words)}: (\d+) of \2 cases", text)
 
 
 def test_the_picture_of_exceedance_goes_through_the_probabilities(folder: Path) -> None:

@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fecm._typing import Indices
+from fecm._typing import Floats, Indices
 from fecm.plot.kinds import LackingError, Picture, PlotError, Width
 from fecm.plot.maps import LEVEL
-from fecm.plot.style import WIDTHS, Look, colours, footer, legend, limit_count, lines_legend, panels
+from fecm.plot.style import (
+    WIDTHS,
+    AxisScale,
+    Look,
+    colours,
+    footer,
+    legend,
+    limit_count,
+    lines_legend,
+    panels,
+)
 from fecm.plot.sweep_data import Where, beyond, case_counts, case_rows, quantity_of, variable_of
+from fecm.results.metrics import THRESHOLD_FORCE
+from fecm.sweeps.limits import PEAK_FORCE
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.statistics import Indices as SobolIndices
-from fecm.sweeps.statistics import RandomResult, exceedance_bounds
-from fecm.sweeps.summary import chance
+from fecm.sweeps.statistics import RandomResult, exceedance_bounds, with_threshold
+from fecm.sweeps.summary import chance, from_threshold_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +37,9 @@ BESIDE: dict[Width, int] = {"column": 2, "full": 4}  # scatter plots in a row
 # Heights of a pair of bars, and of the room around the pairs (in).
 PAIR = 0.3
 AROUND = 0.75
+MOST_NOTES = 2  # probabilities that are written below the curves
 POINT: Look = {"alpha": 0.5, "mew": 0.0, "rasterized": True}
+BETWEEN: Look = {"color": "0.2", "alpha": 0.15, "lw": 0.0}  # thresholds that differ
 POINT_SIZES = (2.2, 5.0)  # size of many points and of few points (pt)
 
 
@@ -57,9 +71,20 @@ class Draws(NamedTuple):
         ]
         return list(level) or limits_of_sweep.tolist()
 
-    def count_doubts(self, axes: Axes) -> None:
-        """Count the draws beyond the range of the model, in a line below a graph."""
-        footer(axes, case_counts(beyond(self.sweep, np.concatenate(list(self.rows.values())))))
+    def thresholds(self, quantity: str) -> Floats:
+        """Return the delamination thresholds to mark, ascending: one if all draws have the same.
+
+        There are none for other quantities than the peak force.
+        """
+        if quantity != PEAK_FORCE or THRESHOLD_FORCE not in self.sweep.summary:
+            return np.empty(0)
+        values = self.sweep[THRESHOLD_FORCE][np.concatenate(list(self.rows.values()))]
+        return np.unique(values[np.isfinite(values)])
+
+    def count_doubts(self, axes: Axes, lines: Sequence[str] = ()) -> None:
+        """Count the draws beyond the range of the model below a graph, under other lines."""
+        doubts = beyond(self.sweep, np.concatenate(list(self.rows.values())))
+        footer(axes, [*lines, *case_counts(doubts)])
 
 
 def _select_draws(results: Sweeps, where: Where | None) -> Draws:
@@ -97,6 +122,9 @@ def exceedance(
     limit_count(len(drawn.rows), "curves")
     every = [quantity_of(drawn.sweep, drawn.name, rows, quantity) for rows in drawn.rows.values()]
     limits = drawn.limits(every[0].name, level)
+    thresholds = drawn.thresholds(every[0].name)
+    if len(thresholds) == 1:
+        limits = list(dict.fromkeys([*thresholds.tolist(), *limits]))
     figure, (axes,) = panels(width)
     notes: list[str] = []
     for (place, rows), shown, colour in zip(drawn.rows.items(), every, colours(), strict=False):
@@ -119,16 +147,41 @@ def exceedance(
             text = chance(p, low, high, open_ends, open_ends)
             notes.append(f"P({shown.name} > {limit:g}) = {text}{case}")
     last = every[-1]
+    if len(thresholds) > 1:
+        notes += _draw_thresholds(axes, drawn, thresholds, last.scale)
     for limit in limits:
-        axes.axvline(limit, zorder=0, label=f"limit {last.scale.show(limit)}", **LEVEL)
+        words = "limit"
+        if [limit] == thresholds.tolist():
+            words = f"delamination {from_threshold_of(drawn.sweep)}"
+        axes.axvline(limit, zorder=0, label=f"{words} {last.scale.show(limit)}", **LEVEL)
     axes.set_yscale("log")
     axes.set_ylim(top=1.15)
     axes.set_ylabel("Probability of exceedance")
     last.scale.name(axes.xaxis, last.label)
-    drawn.count_doubts(axes)
-    if len(drawn.rows) > 1 or limits:
+    drawn.count_doubts(axes, notes if len(notes) <= MOST_NOTES else ())
+    if len(drawn.rows) > 1 or limits or len(thresholds):
         lines_legend(figure, axes)
     return Picture(figure, notes=notes)
+
+
+def _draw_thresholds(
+    axes: Axes, drawn: Draws, thresholds: Floats, scale: AxisScale
+) -> Iterator[str]:
+    """Draw the range of delamination thresholds; yield the probabilities of reaching them."""
+    low, high = float(thresholds[0]), float(thresholds[-1])
+    axes.axvspan(low, high, zorder=0, **BETWEEN)
+    ends = f"{scale.show(low)} to {scale.show(high)}"
+    label = f"delamination {from_threshold_of(drawn.sweep)} {ends}"
+    axes.plot([], [], lw=5.0, color=BETWEEN["color"], alpha=BETWEEN["alpha"], label=label)
+    exceedance = with_threshold(drawn.random, drawn.sweep.summary)
+    row = int(np.flatnonzero((exceedance.quantity == PEAK_FORCE) & np.isnan(exceedance.limit))[0])
+    for place in drawn.rows:
+        case = f", {drawn.random.label(place)}" if drawn.random.combinations else ""
+        where = (place, row) if drawn.random.combinations else (row,)
+        p, lower, upper, count, is_open = (float(values[where]) for values in exceedance[2:])
+        lacking = drawn.random.design.draws - int(count)
+        text = chance(p, lower, upper, int(is_open), lacking)
+        yield f"P({PEAK_FORCE} > threshold) = {text}{case}"
 
 
 def sensitivity(

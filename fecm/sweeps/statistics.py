@@ -13,7 +13,7 @@ from fecm._arrays import compared_by_identity
 from fecm._typing import Bools, Floats
 from fecm.judge.end import MAY_TOUCH, PEAK_NOT_REACHED
 from fecm.results.metrics import THRESHOLD_FORCE, VALIDITY, VERDICTS
-from fecm.sweeps.limits import THRESHOLD, Limit, check_limits
+from fecm.sweeps.limits import PEAK_FORCE, THRESHOLD, Limit, check_limits
 from fecm.sweeps.outcome import Column, Status, was_run
 from fecm.sweeps.random import REMEDY, Design
 
@@ -238,24 +238,50 @@ def evaluate(
     design: Design, cases: Columns, summary: Columns, limits: Sequence[Limit]
 ) -> RandomResult:
     """Evaluate the cases of a random sweep, (combinations * rows,) each."""
-    fine, is_open = was_run(summary["status"]), open_cases(summary)
     combinations = {n: v[:: design.rows] for n, v in cases.items() if n not in design.laws}
     shape = (-1, design.rows) if combinations else (design.rows,)
-    columns = {
-        name: np.where(fine, values, np.nan).reshape(shape)
-        for name, values in summary.items()
-        if name not in VERDICTS
-    }
+    columns, is_open = _by_draw(summary, shape)
     draws = {name: values[..., : design.draws] for name, values in columns.items()}
     check_limits(limits, list(columns), threshold=THRESHOLD_FORCE in columns)
     return RandomResult(
         design=design,
         statistics={name: statistics(values) for name, values in draws.items()},
         sensitivity=_sensitivity(design, columns) if design.sensitivity else {},
-        exceedance=exceedances(draws, is_open.reshape(shape)[..., : design.draws], limits),
+        exceedance=exceedances(draws, is_open[..., : design.draws], limits),
         combinations=combinations,
-        notes=tuple(_notes(design, columns, fine)),
+        notes=tuple(_notes(design, columns, was_run(summary["status"]))),
     )
+
+
+def _by_draw(summary: Columns, shape: tuple[int, ...]) -> tuple[dict[str, Floats], Bools]:
+    """Return the results of the cases by draw, NaN for those that failed, and which are open."""
+    fine = was_run(summary["status"])
+    columns = {
+        name: np.where(fine, values, np.nan).reshape(shape)
+        for name, values in summary.items()
+        if name not in VERDICTS
+    }
+    return columns, open_cases(summary).reshape(shape)
+
+
+def with_threshold(random: RandomResult, summary: Columns) -> Exceedance:
+    """Return the probabilities of a sweep, first that the peak reaches the delamination threshold.
+
+    They are those of the sweep if it has this one, has no thresholds, or is a search.
+    """
+    stored, design = random.exceedance, random.design
+    if THRESHOLD_FORCE not in summary or "found_velocity" in summary:
+        return stored
+    shape = (-1, design.rows) if random.combinations else (design.rows,)
+    columns, is_open = _by_draw(summary, shape)
+    draws = {name: columns[name][..., : design.draws] for name in (PEAK_FORCE, THRESHOLD_FORCE)}
+    added = exceedances(draws, is_open[..., : design.draws], [Limit(PEAK_FORCE, THRESHOLD)])
+    is_there = (stored.quantity == PEAK_FORCE) & np.isclose(
+        stored.limit, added.limit, rtol=ROUNDING, equal_nan=True
+    )
+    if is_there.any():
+        return stored
+    return Exceedance(*(np.concatenate(pair, axis=-1) for pair in zip(added, stored, strict=True)))
 
 
 def _sensitivity(design: Design, columns: Columns) -> dict[str, Indices]:
