@@ -15,20 +15,25 @@ from fecm.sweeps.result import SweepResult
 MOST_TESTS = 30  # cases that are listed one by one
 
 
-def tests(name: str, sweep: SweepResult) -> Iterator[PageBlock]:
-    """Yield tables and pictures of the results of a sweep beside measured columns."""
+def test_pictures(name: str, sweep: SweepResult) -> Iterator[PageBlock]:
+    """Yield pictures of the results of a sweep over measured columns."""
+    for compared in comparisons(sweep):
+        words = compared.name.replace("_", " ").capitalize()
+        caption = f"{words} of the tests, computed over measured."
+        yield from figures.drawn(
+            PictureKind.MEASURED, {name: sweep}, caption, quantity=compared.name
+        )
+
+
+def test_tables(sweep: SweepResult) -> Iterator[PageBlock]:
+    """Yield tables of the results of a sweep beside measured columns."""
     compared = comparisons(sweep)
-    yield from page_table(
-        map(_comparison_row, compared),
-        (
-            *("quantity", "cases", "computed over measured", "from", "to"),
-            *(f"within ±{100.0 * BAND:g} %", "bias", "rms of the difference"),
-        ),
-        "Computed against measured values",
+    header = (
+        *("quantity", "cases", "computed over measured", "from", "to"),
+        *(f"within ±{100.0 * BAND:g} %", "bias", "rms of the difference"),
     )
-    for one in compared:
-        caption = f"{one.name.replace('_', ' ').capitalize()}: computed over measured values."
-        yield from figures.drawn(PictureKind.MEASURED, {name: sweep}, caption, quantity=one.name)
+    title = "Computed against measured values"
+    yield from page_table(map(_comparison_row, compared), header, title)
     if compared:
         yield from _cases(sweep, compared)
 

@@ -17,6 +17,7 @@ from fecm.plot.kinds import PictureKind
 from fecm.report import figures
 from fecm.report.content import (
     UNKNOWN,
+    Answer,
     Judgements,
     PageBlock,
     ReportPage,
@@ -28,16 +29,17 @@ from fecm.report.content import (
     share,
     worst,
 )
-from fecm.report.measured import tests
-from fecm.results.metrics import RATIO, VERDICTS, described
-from fecm.sweeps.measured import comparisons, ratios_in_words
+from fecm.report.measured import test_pictures, test_tables
+from fecm.report.sweep_head import answers, headlines
+from fecm.results.metrics import FACTOR, INTEGERS, RATIO, VERDICTS, described
 from fecm.sweeps.random import Design
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.statistics import QUANTILES, RandomResult
-from fecm.sweeps.summary import MAIN, chance, sweep_verdict, symmetry_text, threshold_text
+from fecm.sweeps.summary import MAIN, sweep_verdict, symmetry_text, threshold_text
 
 FOUND = "found_velocity"
 PEAK = "peak_force"
+ON_FIRST_SHEET = 2  # pictures below the headline figures
 MOST_NAMED = 4  # values that name a case
 MOST_VALUES = 8  # different values of a name that are listed one by one
 MOST_COMBINATIONS = 12  # of varied values, whose statistics are listed
@@ -50,51 +52,38 @@ def sweep_page(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Rep
     """
     judged = list(_judgements(sweep))
     level = worst(judged)
+    pictures = (*_pictures(name, sweep), *test_pictures(name, sweep))
     drawn = [] if sweep.random is None else _random(sweep, sweep.random)
     body = sections(
         [
             ("Trust", [Judgements(tuple(judged)), *note_list(sweep.notes, "Notes of the sweep")]),
             ("Varied values", _varied(sweep)),
             ("Results", [*_extremes(sweep), *_convergence(sweep), *_reduced(sweep), *drawn]),
-            ("Tests", tests(name, sweep)),
-            ("Pictures", _pictures(name, sweep)),
+            ("Tests", test_tables(sweep)),
+            ("Pictures", pictures[ON_FIRST_SHEET:]),
             ("Provenance", _provenance(name, sweep, digests)),
         ]
     )
-    return ReportPage(sweep.title or name, tuple(_sentences(sweep)), level, body)
+    verdict: tuple[str | Answer, ...] = (*answers(sweep), *_remarks(sweep), _sentence(sweep))
+    return ReportPage(
+        sweep.title or name,
+        verdict,
+        level,
+        body,
+        headlines=tuple(headlines(sweep)),
+        first_sheet=pictures[:ON_FIRST_SHEET],
+    )
 
 
-def _sentences(sweep: SweepResult) -> Iterator[str]:
-    """Yield sentences about what was varied and what resulted."""
-    what = FOUND if FOUND in sweep.summary else PEAK
+def _sentence(sweep: SweepResult) -> str:
+    """Say what was varied, how many cases there are, and how many are in doubt."""
     names = ", ".join(sweep.cases) or "nothing"
-    yield f"A sweep over {names}; {sweep_verdict(sweep)}."
-    if text := symmetry_text(sweep):
-        yield f"{text[0].upper()}{text[1:]}."
-    if (random := sweep.random) is not None and not random.combinations:
-        exceedance = random.exceedance
-        for row, (name, limit) in enumerate(
-            zip(exceedance.quantity, exceedance.limit, strict=True)
-        ):
-            p, low, high, count, is_open = (float(values[row]) for values in exceedance[2:])
-            lacking = random.design.draws - int(count)
-            limit_text = "its threshold" if np.isnan(limit) else f"{limit:.6g} {sweep.unit(name)}"
-            chances = chance(p, low, high, int(is_open), lacking)
-            yield f"The probability that {name} exceeds {limit_text.rstrip()} is {chances}."
-    values = _fine(sweep, what)
-    if np.isfinite(values).any():
-        unit = sweep.unit(what)
-        ends = [quantity(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
-        with_value = int(np.isfinite(values).sum())
-        where = (
-            f" in the {with_value} of {len(values)} cases that have it"
-            if with_value < len(values)
-            else ""
-        )
-        yield f"{what.replace('_', ' ').capitalize()}: {' to '.join(ends)}{where}."
-    for compared in comparisons(sweep):
-        text = ratios_in_words(compared)
-        yield f"{compared.name.replace('_', ' ').capitalize()} of the tests: {text}."
+    symmetry = f"; {text}" if (text := symmetry_text(sweep)) else ""
+    return f"A sweep over {names}; {sweep_verdict(sweep)}{symmetry}."
+
+
+def _remarks(sweep: SweepResult) -> Iterator[str]:
+    """Yield what the answers of a search do not say."""
     if text := threshold_text(sweep):
         yield f"Delamination: {text}."
 
@@ -157,7 +146,7 @@ def _extremes(sweep: SweepResult) -> list[PageBlock]:
         if name in VERDICTS or column.dtype.kind != "f" or column.ndim > 1:
             continue
         values = _fine(sweep, name)
-        if not np.isfinite(values).any():
+        if not np.isfinite(values).any() or _is_usual(name, values):
             continue
         low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
         unit = sweep.unit(name)
@@ -170,6 +159,12 @@ def _extremes(sweep: SweepResult) -> list[PageBlock]:
         rows.append((name.replace("_", " "), cells[1], cells[0], cells[3], cells[2]))
     header = ("quantity", "smallest", "case", "largest", "case")
     return page_table(rows, header, "Smallest and largest values of the cases that were run")
+
+
+def _is_usual(name: str, values: np.ndarray) -> bool:
+    """Return whether all cases have what nearly every impact has: one contact, or the value 0."""
+    usual = 1.0 if name in INTEGERS or name == FACTOR else 0.0
+    return bool((values[np.isfinite(values)] == usual).all())
 
 
 def _convergence(sweep: SweepResult) -> list[PageBlock]:

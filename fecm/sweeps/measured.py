@@ -13,6 +13,7 @@ from fecm.deck.units import quantity
 from fecm.sweeps.outcome import MEASURED
 from fecm.sweeps.stored import StoredSweep
 
+RATIOS = "computed over measured"
 BAND = 0.1  # relative difference up to which a computed value counts as equal to the measured one
 
 
@@ -84,7 +85,7 @@ def ratios_in_words(compared: CaseComparison) -> str:
     """Return mean and range of the ratios, and how many are near 1."""
     count, (mean, low, high) = int(compared.pairs.sum()), compared.ratio_statistics
     near = f"{compared.within} of {count} within {100.0 * BAND:g} %"
-    return f"computed over measured {mean:.3g} ({low:.3g} to {high:.3g}), {near}"
+    return f"{RATIOS} {mean:.3g} ({low:.3g} to {high:.3g}), {near}"
 
 
 def compared_columns(sweep: StoredSweep) -> dict[str, str]:

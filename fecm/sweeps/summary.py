@@ -38,7 +38,7 @@ from fecm.sweeps.limits import THRESHOLD
 from fecm.sweeps.measured import comparisons
 from fecm.sweeps.outcome import Column
 from fecm.sweeps.random import pairs_of
-from fecm.sweeps.statistics import QUANTILES, RandomResult
+from fecm.sweeps.statistics import QUANTILES, ROUNDING, RandomResult
 from fecm.sweeps.stored import StoredSweep
 
 GIVEN = 6  # digits of the values of a case, unless others are closer
@@ -73,9 +73,9 @@ def sweep_answer(result: StoredSweep) -> str:
 
 def _peak_answer(result: StoredSweep) -> list[str]:
     """Say how large the peak forces are, and how many cases delaminate or fail."""
-    parts = [f"peak force {_range_of(result, 'peak_force')}"]
+    parts = [f"peak force {range_of(result, 'peak_force')}"]
     if (study := result.convergence.get("peak_force")) is not None:
-        parts = [_limit_answer(result, study)]
+        parts = [limit_answer(result, study)]
     reasons_by_case = [reasons_of(validity) for validity in result.validity.tolist()]
     for limit, what in ((THRESHOLD_LIMIT, "delamination threshold"), (EXPOSURE, "first failure")):
         beyond = np.array([limit.reason in reasons for reasons in reasons_by_case])
@@ -86,12 +86,13 @@ def _peak_answer(result: StoredSweep) -> list[str]:
     return parts
 
 
-def _range_of(result: StoredSweep, name: str) -> str:
+def range_of(result: StoredSweep, name: str) -> str:
     """Format the mean and the standard deviation of draws, or the range of other cases."""
     unit = result.unit(name)
     if result.random is not None and not result.random.combinations:
         statistics = result.random.statistics[name]
-        moments = [float(statistics.mean), float(statistics.standard_deviation)]
+        mean, deviation = float(statistics.mean), float(statistics.standard_deviation)
+        moments = [mean, deviation] if deviation > ROUNDING * abs(mean) else [mean]
         return _together([m for m in moments if math.isfinite(m)], "±", unit) or "open"
     values = result[name][result.completed]
     values = values[np.isfinite(values)]
@@ -110,11 +111,11 @@ def _together(values: Sequence[float], word: str, unit: str) -> str:
     if not values:
         return ""
     power, name = readable(values[0], unit)
-    texts = (significant(value / 10.0**power) for value in values)
+    texts = dict.fromkeys(significant(value / 10.0**power) for value in values)
     return f"{f' {word} '.join(texts)} {name}".rstrip()
 
 
-def _limit_answer(result: StoredSweep, study: Convergence) -> str:
+def limit_answer(result: StoredSweep, study: Convergence) -> str:
     """Format the peak force of the finest mesh, and its limit."""
     unit = result.unit("peak_force")
     finest = f"peak force {quantity(float(result['peak_force'][-1]), unit)} on the finest mesh"
@@ -137,13 +138,13 @@ def _from(result: StoredSweep, beyond: Bools) -> str:
 
 def _found_answer(result: StoredSweep) -> list[str]:
     """Say at which energies the value searched for is reached."""
-    if _is_at_threshold(result):
+    if is_at_threshold(result):
         what = f"delaminates, {from_threshold_of(result)}"
     elif all(name in result.summary for name in FOUND_BAND):
         what = "first failure at"
     else:
-        what = f"peak force {_range_of(result, 'peak_force')} from"
-    energy, velocity = (_range_of(result, f"found_{name}") for name in ("energy", "velocity"))
+        what = f"peak force {range_of(result, 'peak_force')} from"
+    energy, velocity = (range_of(result, f"found_{name}") for name in ("energy", "velocity"))
     return [f"{what} {energy} ({velocity})"]
 
 
@@ -156,7 +157,6 @@ def _case_rows(result: StoredSweep) -> list[Row]:
         rows.append(("contact law", f"{result.law}, instead of EXPE"))
     if result.measured:
         rows.append(("measured", f"{', '.join(result.measured)}, which are not varied"))
-        rows += [(compared.name, str(compared)) for compared in comparisons(result)]
         rows += [(compared.name, str(compared)) for compared in comparisons(result)]
     if text := symmetry_text(result):
         rows.append(("symmetry", text))
@@ -223,7 +223,7 @@ def from_threshold_of(result: StoredSweep) -> str:
     return from_threshold(0 if card is None else int(card.number))
 
 
-def _is_at_threshold(result: StoredSweep) -> bool:
+def is_at_threshold(result: StoredSweep) -> bool:
     """Return whether a search has found the velocities at the delamination threshold."""
     if not {"found_energy", THRESHOLD_FORCE} <= result.summary.keys():
         return False
@@ -233,7 +233,7 @@ def _is_at_threshold(result: StoredSweep) -> bool:
 
 def threshold_text(result: StoredSweep) -> str:
     """Say what the energies found at the threshold are; empty for other sweeps and searches."""
-    if not _is_at_threshold(result) or from_threshold_of(result) != AT_THE_LATEST:
+    if not is_at_threshold(result) or from_threshold_of(result) != AT_THE_LATEST:
         return ""
     return (
         f"{AT_THE_LATEST} these energies, which are for one delamination; plies and interfaces may "
