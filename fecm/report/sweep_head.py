@@ -246,5 +246,5 @@ def _figure(sweep: SweepResult, name: str, label: str) -> Headline:
     known = int(np.isfinite(sweep[name][sweep.completed]).sum())
     remarks = ["mean ± standard deviation"] if is_mean else []
     if known < len(sweep):
-        remarks.append(f"of the {known} cases that have it")
+        remarks.append(f"in the {known} of {len(sweep)} cases that have it")
     return Headline(label, value, tuple(remarks))
