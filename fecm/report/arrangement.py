@@ -39,7 +39,7 @@ LARGEST_LABEL, SMALLEST_LABEL = 6.5, 4.0  # points
 
 def arrangement(name: str, result: Result, problem: Problem, hits: Impactor) -> Figure:
     """Draw the test to scale. Raises PlotError if the result lacks the mesh or the deck."""
-    with rc_context(style.RC):
+    with rc_context(style.RC | {"axes.formatter.use_mathtext": False}):
         cut = data.patches(result, 4, name)
         length = style.scale_of({name: result}, "length", [result["mesh/coordinates"]])
         high = max(LEAST_HEIGHT, DRAWN * (aspect(cut.points) + OF_SECTION) + ROOM)

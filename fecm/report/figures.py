@@ -14,7 +14,7 @@ from fecm.deck.model import Layer
 from fecm.deck.units import prefixed
 from fecm.plot.kinds import PictureKind, PlotError
 from fecm.plot.pictures import draw
-from fecm.plot.style import RC, Look, panels
+from fecm.plot.style import RC, Look, panels, save
 from fecm.problem.problem import Problem
 from fecm.report.arrangement import arrangement, draw_stack
 from fecm.report.content import PageBlock, PagePicture, data_address
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 LARGEST = 150_000  # bytes of a drawing in lines, above which it becomes pixels
 BYTES_A_POINT = 30  # of a collection of paths in SVG
+# Ticks are numbers without mathematics, which takes 4 ms each to set.
+STYLE: Any = {**RC, "axes.formatter.use_mathtext": False}
 FIRST: Look = {"marker": "o", "ms": 4.0, "mfc": "none", "color": "#C00000"}  # first failure
 DOTS = 200  # of pixels, per inch
 
@@ -56,15 +58,11 @@ def _is_large(figure: Figure) -> bool:
 
 def _bytes(figure: Figure, form: str) -> bytes:
     """Return a figure in a format. Equal figures give equal bytes."""
-    import matplotlib
-
-    from fecm.plot.style import RC, save
-
     file = io.BytesIO()
     if (engine := figure.get_layout_engine()) is not None:
         engine.execute(figure)  # once; saving a figure with a layout engine draws it twice
         figure.set_layout_engine(None)
-    with matplotlib.rc_context(RC), warnings.catch_warnings(action="ignore"):
+    with rc_context(STYLE), warnings.catch_warnings(action="ignore"):
         save(figure, file, f".{form}", DOTS)
     return file.getvalue()
 
@@ -81,7 +79,7 @@ def drawn(
     """Yield a picture of a kind, unless the results lack what it shows."""
     with warnings.catch_warnings(action="ignore"):
         try:
-            picture = draw(kind, results, **options)
+            picture = draw(kind, results, STYLE, **options)
         except PlotError:
             return
     yield PagePicture(inside(picture.figure), alternative or caption, caption, wide)
@@ -108,9 +106,9 @@ def forces(results: Mapping[str, Result]) -> Iterator[PageBlock]:
 
 def force(name: str, result: Result) -> Iterator[PageBlock]:
     """Yield the contact force of one run, with its first failure."""
-    with rc_context(RC), warnings.catch_warnings(action="ignore"):
+    with rc_context(STYLE), warnings.catch_warnings(action="ignore"):
         try:
-            picture = draw(PictureKind.FORCE, {name: result})
+            picture = draw(PictureKind.FORCE, {name: result}, STYLE)
         except PlotError:
             return
         (axes, *_) = picture.figure.axes
@@ -191,7 +189,7 @@ HEIGHTS = (1.5, 5.5)  # smallest and largest height of the plies (in)
 def stack(layers: Sequence[Layer], names: Mapping[int, str]) -> Figure:
     """Draw the plies of a laminate; see :func:`~fecm.report.arrangement.draw_stack`."""
     height = float(np.clip(len(layers) * PLY_HEIGHT, *HEIGHTS)) + 0.3
-    with rc_context(RC):
+    with rc_context(STYLE):
         figure, (axes,) = panels("column", ratio=height / WIDTH)
         draw_stack(axes, layers, names, height)
     return figure

@@ -80,11 +80,9 @@ def _delamination(result: Result) -> tuple[str, str]:
     energy = energy_at_force(result, force)
     words = from_threshold(result.threshold.get("number"))
     if largest > THRESHOLD.value * force:
-        at_force = _headline(result, force, "force")
-        return (
-            "YES",
-            f", {words} {at_force if math.isnan(energy) else f'about {_energy(result, energy)}'} on.",
-        )
+        about = f"about {_energy(result, energy)}"
+        at = _headline(result, force, "force") if math.isnan(energy) else about
+        return "YES", f", {words} {at} on."
     answer = "OPEN" if result.end in OPEN_PEAKS else "NO"
     return answer, f", the threshold is {threshold_verdict(result)}."
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from fecm._table import ShownNumber
 from fecm._text import FITTED_DIGITS
@@ -27,8 +27,8 @@ from fecm.report.content import (
 from fecm.report.figures import inside
 
 
-def identification_page(name: str, fit: Identification) -> ReportPage:
-    """Return the page about a fit. `name` is the name of the measurement."""
+def identification_page(name: str, fit: Identification, _digests: Mapping[str, str]) -> ReportPage:
+    """Return the page about a fit, which has no file. `name` is the name of the measurement."""
     values = ", ".join(_format_parameter(fit, key) for key in fit.values)
     verdict = [f"Fitted to {name}: {values}."]
     level, sentence = VERDICTS[fit.verdict]

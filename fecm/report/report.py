@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
 
-from fecm.identification.result import Identification
 from fecm.report.content import ReportError, ReportPage, check_page, with_head, write
-from fecm.report.identification import identification_page
 from fecm.report.run import run_page
-from fecm.report.sweep import sweep_page
 from fecm.results.result import Result
-from fecm.results.written import PageOptions
-from fecm.sweeps.result import SweepResult
+from fecm.results.written import PageOptions, Reported
 
-Reported = Result | SweepResult | Identification
+# Module and function of the page of a single result, by the name of its class.  They are imported
+# when they are called: with the rooms below them they take 0.3 s, which pages of runs do not need.
+PAGES = {
+    "SweepResult": ("fecm.report.sweep", "sweep_page"),
+    "Identification": ("fecm.report.identification", "identification_page"),
+}
 
 
 def digest(path: Path) -> str:
@@ -47,10 +49,9 @@ def _page_of(
     if len(results) > 1:
         raise ReportError("a sweep has a page of its own; give one sweep, or results of runs")
     ((name, only),) = results.items()
-    if isinstance(only, SweepResult):
-        return sweep_page(name, only, digests or {})
-    assert isinstance(only, Identification)
-    return identification_page(name, only)
+    module, function = PAGES[type(only).__name__]
+    page: Callable[..., ReportPage] = getattr(import_module(module), function)
+    return page(name, only, digests or {})
 
 
 def write_report(
