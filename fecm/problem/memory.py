@@ -19,7 +19,6 @@ from fecm.mechanics import interpolation
 from fecm.mechanics.impact_steps import FIELDS, TOGETHER
 from fecm.mechanics.plate import ASSEMBLED, BLOCK, PlateModel
 from fecm.mechanics.projectile import REPORT_ELEMENTS
-from fecm.mechanics.reduced_plate import MORE_VECTORS, VECTORS_PER_MODE, bytes_of_pairs
 from fecm.mechanics.solutions import DENSE, FACTORS
 from fecm.mechanics.stiffness_product import AUTO, CSR, KERNELS, WORTH_GROUPING, resolved
 from fecm.mechanics.strains import STRAINS
@@ -66,7 +65,7 @@ def needed_bytes(
     total += max(
         _fields(checked) if together else 0, _buckling(model) if model.is_compressed else 0
     )
-    total += _factors(model, words)
+    total += factor_bytes(model, words)
     n = checked.mesh.number_of_equations
     if modes := max(
         (min(n, every(m)) for m in flat(checked.program) if m.word == "EIGE"), default=0
@@ -134,19 +133,6 @@ def _fields(checked: Problem) -> int:
     return 8 * rows * (field + max(n, strains))
 
 
-def reduction_bytes(model: PlateModel, modes: int) -> int:
-    """Return the bytes of the reduction of a plate to some bending modes."""
-    n, in_plane = model.neq, int(np.count_nonzero(model.mesh.equations[:, :2]))
-    vectors = min(n, VECTORS_PER_MODE * modes + MORE_VECTORS)
-    factors = _factors(model, {"TANG"})
-    return (
-        ASSEMBLED * model.entries
-        + factors
-        + 8 * n * vectors
-        + bytes_of_pairs(model, in_plane, modes)
-    )
-
-
 def _buckling(model: PlateModel) -> int:
     """Return the bytes of the matrices for the buckling load, and of the factors with copies."""
     if model.is_curved:
@@ -156,7 +142,7 @@ def _buckling(model: PlateModel) -> int:
     return int(ASSEMBLED * share * model.entries + FACTORS * coupled * n * math.log2(n + 1))
 
 
-def _factors(model: PlateModel, words: set[str]) -> int:
+def factor_bytes(model: PlateModel, words: set[str]) -> int:
     """Return the bytes of the factors of the stiffness.
 
     They grow with n log n for a well-ordered plane mesh, and with n^1.5 for nodes in columns.

@@ -25,7 +25,7 @@ from fecm.authoring.values import FAILURE_NAMES, REFINE, apply_case
 from fecm.deck.model import Nonlinear
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.own_law import law_name
-from fecm.problem.memory import needed_bytes, reduction_bytes
+from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
 from fecm.sweeps.backends import (
     FORCES,
@@ -49,7 +49,7 @@ from fecm.sweeps.limits import PEAK_FORCE, THRESHOLD
 from fecm.sweeps.outcome import About, Backend, Outcome, Status, merge
 from fecm.sweeps.price import expected, work_of_plates, work_of_runs
 from fecm.sweeps.random import cost_of_plates, cost_of_runs
-from fecm.sweeps.reduced import MOST_MODES, tasks_beside_full_runs
+from fecm.sweeps.reduced import MOST_MODES, reduction_bytes, tasks_beside_full_runs
 from fecm.sweeps.search import FIRST_VELOCITIES, Sought, search
 from fecm.sweeps.task import (
     MOST_TOGETHER,

@@ -24,13 +24,18 @@ from fecm.authoring.time_values import duration_of
 from fecm.authoring.values import strike_of_case
 from fecm.mechanics.contact_law import ContactPoint
 from fecm.mechanics.impact import ContactState, couple_step
+from fecm.mechanics.plate import ASSEMBLED, PlateModel
 from fecm.mechanics.reduced_plate import (
+    MORE_VECTORS,
+    VECTORS_PER_MODE,
     ReducedMotion,
     ReducedPlate,
     ReductionError,
     SeriesLaw,
+    bytes_of_pairs,
     reduced_plate,
 )
+from fecm.problem.memory import factor_bytes
 from fecm.problem.problem import Problem
 from fecm.results.metrics import RATIO, IndentationMetrics
 from fecm.results.schema import SWEEP_DATASETS
@@ -407,3 +412,16 @@ def reduced_of(contents: FileContents) -> ReducedModel | None:
     if len({np.shape(values) for values in columns.values()}) != 1:
         raise ResultFileError(f"{contents.path}: columns of the reduced model differ in length")
     return ReducedModel(modes, columns, in_full)
+
+
+def reduction_bytes(model: PlateModel, modes: int) -> int:
+    """Return the bytes of the reduction of a plate to some bending modes."""
+    n, in_plane = model.neq, int(np.count_nonzero(model.mesh.equations[:, :2]))
+    vectors = min(n, VECTORS_PER_MODE * modes + MORE_VECTORS)
+    factors = factor_bytes(model, {"TANG"})
+    return (
+        ASSEMBLED * model.entries
+        + factors
+        + 8 * n * vectors
+        + bytes_of_pairs(model, in_plane, modes)
+    )
