@@ -134,16 +134,13 @@ def _peak_answer(result: Stored) -> str:
 
 def _delamination_answer(result: Stored) -> str:
     """Say whether the plate delaminates, and from which force and energy."""
-    force = _with_energy(result, float(result.threshold["force"]))
+    threshold = float(result.threshold["force"])
+    force = _quantity(result, threshold, "force")
+    if energy := _scaled_energy(result, threshold):
+        force = f"{force} ({energy})"
     if math.isfinite(float(result.threshold["time"])):
         return f"delaminates, {from_threshold(result.threshold.get('number'))} {force}"
     return f"delamination threshold of {force} {threshold_verdict(result)}"
-
-
-def _with_energy(result: Stored, force: float) -> str:
-    """Format a force, and the impact energy whose peak it is, if the run gives it."""
-    energy = _scaled_energy(result, force)
-    return f"{_quantity(result, force, 'force')}{f' ({energy})' if energy else ''}"
 
 
 def _scaled_energy(result: Stored, force: float) -> str:
@@ -165,7 +162,7 @@ def _failure_answer(result: Stored) -> list[str]:
         return [f"failure: {no_failure(largest, end_of(result))} (largest exposure {most:.3g})"]
     failure = first[0]
     words = failure_in_words(failure.criterion, failure.mode, failure.where)
-    at = "" if math.isnan(failure.force) else f", at {_with_energy(result, failure.force)}"
+    at = "" if math.isnan(failure.force) else f", at {_quantity(result, failure.force, 'force')}"
     return [f"first failure: {on_this_mesh(largest)}{words}{at}"]
 
 

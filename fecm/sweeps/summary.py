@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +35,7 @@ from fecm.results.metrics import FACTOR, FOUND_BAND, RATIO, THRESHOLD_FORCE
 from fecm.results.stored import whole_plate
 from fecm.sweeps.convergence import Convergence, convergence_table
 from fecm.sweeps.limits import THRESHOLD
-from fecm.sweeps.measured import comparisons
+from fecm.sweeps.measured import comparisons, ratios_in_words
 from fecm.sweeps.outcome import Column
 from fecm.sweeps.random import pairs_of
 from fecm.sweeps.statistics import QUANTILES, ROUNDING, RandomResult
@@ -67,6 +67,7 @@ def sweep_answer(result: StoredSweep) -> str:
     parts = _found_answer(result) if "found_energy" in result.summary else _peak_answer(result)
     if result.random is not None:
         parts += _chances(result.random)
+    parts += [f"{compared.name} {ratios_in_words(compared)}" for compared in comparisons(result)]
     answer = "; ".join(parts)
     return f"{answer[0].upper()}{answer[1:]}"
 
@@ -92,27 +93,20 @@ def range_of(result: StoredSweep, name: str) -> str:
     if result.random is not None and not result.random.combinations:
         statistics = result.random.statistics[name]
         mean, deviation = float(statistics.mean), float(statistics.standard_deviation)
-        moments = [mean, deviation] if deviation > ROUNDING * abs(mean) else [mean]
-        return _together([m for m in moments if math.isfinite(m)], "±", unit) or "open"
-    values = result[name][result.completed]
-    values = values[np.isfinite(values)]
-    ends = sorted({float(values.min()), float(values.max())}) if values.size else []
-    return _together(ends, "to", unit) or "open"
-
-
-def _together(values: Sequence[float], word: str, unit: str) -> str:
-    """Format values with a word between them and one unit, which suits the first.
-
-    Examples
-    --------
-    >>> _together([950.0, 1200.0], "to", "N*mm")
-    '950 to 1200 mJ'
-    """
-    if not values:
-        return ""
-    power, name = readable(values[0], unit)
-    texts = dict.fromkeys(significant(value / 10.0**power) for value in values)
-    return f"{f' {word} '.join(texts)} {name}".rstrip()
+        if math.isnan(mean):
+            return "open"
+        power, name = readable(mean, unit)
+        spread = f" ± {significant(deviation / 10.0**power, 2)}"
+        texts = [significant(mean / 10.0**power) + spread * (deviation > ROUNDING * abs(mean))]
+    else:
+        values = result[name][result.completed]
+        values = values[np.isfinite(values)]
+        if not values.size:
+            return "open"
+        power, name = readable(float(values.min()), unit)
+        ends = (float(values.min()), float(values.max()))
+        texts = [*dict.fromkeys(significant(end / 10.0**power) for end in ends)]
+    return f"{' to '.join(texts)} {name}".rstrip()
 
 
 def limit_answer(result: StoredSweep, study: Convergence) -> str:
@@ -144,8 +138,8 @@ def _found_answer(result: StoredSweep) -> list[str]:
         what = "first failure at"
     else:
         what = f"peak force {range_of(result, 'peak_force')} from"
-    energy, velocity = (range_of(result, f"found_{name}") for name in ("energy", "velocity"))
-    return [f"{what} {energy} ({velocity})"]
+    velocity = f" ({range_of(result, 'found_velocity')})" if len(result) == 1 else ""
+    return [f"{what} {range_of(result, 'found_energy')}{velocity}"]
 
 
 def _case_rows(result: StoredSweep) -> list[Row]:
