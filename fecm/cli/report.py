@@ -11,7 +11,7 @@ from click import option
 from fecm.cli.common import RefusedError, echo_path
 from fecm.cli.isolation import reads
 from fecm.cli.options import NAMED_PATH, GroupedCommand, groups_of, job_options, typical
-from fecm.cli.plot import named, run_or_sweep
+from fecm.cli.plot import loaded_result, named
 from fecm.report.content import check_page
 from fecm.results.hdf5_reader import read
 from fecm.results.schema import Form
@@ -47,7 +47,7 @@ def report_command(
     opens: bool,
     overwrite: bool,
 ) -> None:
-    """Write a report page about RESULT: of a run, of a sweep, or of several runs side by side.
+    """Write a report page about RESULT: a run, a sweep, a location, or several runs side by side.
 
     The page is self-contained: answers, headline figures, range of the model, numbers, pictures,
     model, checksums and the deck.  It needs no network and no scripts, and prints on A4.
@@ -59,9 +59,7 @@ def report_command(
     from fecm.report.report import digest, write_report
 
     paths = named(results)
-    loaded = {
-        name: run_or_sweep(read(place, Form.RUN, Form.SWEEP)) for name, place in paths.items()
-    }
+    loaded = {name: loaded_result(read(place, *Form)) for name, place in paths.items()}
     digests = {name: digest(place) for name, place in paths.items()}
     write_report(loaded, path, digests, page_options, overwrite=overwrite)
     echo_path(path)

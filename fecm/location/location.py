@@ -23,7 +23,7 @@ from fecm.results import schema
 from fecm.results.groups import NotStoredError
 from fecm.results.pictures import plot_results
 from fecm.results.stored import deck_in
-from fecm.results.written import Saved
+from fecm.results.written import Reported, Saved
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -95,7 +95,7 @@ class Candidate(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Location(Saved):
+class Location(Saved, Reported):
     """Place and force history of an impact, located from strain gages.
 
     Standard deviations have two parts. The first is the Cramér-Rao bound for independent errors of
@@ -210,6 +210,10 @@ class Location(Saved):
         for name, values in vars(self).items():
             if isinstance(values, np.ndarray):
                 object.__setattr__(self, name, read_only(values))
+
+    @property
+    def _name(self) -> str:
+        return self.deck.title or "the impact"
 
     @property
     def sd_x(self) -> float:

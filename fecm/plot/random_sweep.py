@@ -81,6 +81,12 @@ class Draws(NamedTuple):
         values = self.sweep[THRESHOLD_FORCE][np.concatenate(list(self.rows.values()))]
         return np.unique(values[np.isfinite(values)])
 
+    def words_of(self, quantity: str, limit: float) -> str:
+        """Return the words before a limit: whether it is the delamination threshold."""
+        if [limit] == self.thresholds(quantity).tolist():
+            return f"delamination {from_threshold_of(self.sweep)}"
+        return "limit"
+
     def count_doubts(self, axes: Axes, lines: Sequence[str] = ()) -> None:
         """Count the draws beyond the range of the model below a graph, under other lines."""
         doubts = beyond(self.sweep, np.concatenate(list(self.rows.values())))
@@ -150,9 +156,7 @@ def exceedance(
     if len(thresholds) > 1:
         notes += _draw_thresholds(axes, drawn, thresholds, last.scale)
     for limit in limits:
-        words = "limit"
-        if [limit] == thresholds.tolist():
-            words = f"delamination {from_threshold_of(drawn.sweep)}"
+        words = drawn.words_of(last.name, limit)
         axes.axvline(limit, zorder=0, label=f"{words} {last.scale.show(limit)}", **LEVEL)
     axes.set_yscale("log")
     axes.set_ylim(top=1.15)
@@ -256,7 +260,8 @@ def scatter(
         over = variable_of(drawn.sweep, law, drawn.sweep[law][rows])
         axes.plot(over.values, shown.values, ".", ms=size, color=colours()[0], **POINT)
         for limit in limits:
-            axes.axhline(limit, label=f"limit {shown.scale.show(limit)}", **LEVEL)
+            words = drawn.words_of(shown.name, limit)
+            axes.axhline(limit, label=f"{words} {shown.scale.show(limit)}", **LEVEL)
         over.scale.name(axes.xaxis, over.label)
         if not place % columns:
             shown.scale.name(axes.yaxis, shown.label)

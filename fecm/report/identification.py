@@ -5,14 +5,16 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 
-from fecm._table import ShownNumber
+from fecm._table import Row, ShownNumber
 from fecm._text import FITTED_DIGITS
-from fecm.deck.units import readable, unit_names, unit_of
+from fecm.deck.units import prefixed, uncertain, unit_names, unit_of
 from fecm.identification.result import Identification, identification_tables
 from fecm.judge.fits import NOT_CONVERGED, VERDICTS
 from fecm.judge.limits import Judgement, TrustLevel
 from fecm.plot.histories import force_fit_picture
 from fecm.report.content import (
+    Answer,
+    Headline,
     Judgements,
     PageBlock,
     PagePicture,
@@ -25,32 +27,51 @@ from fecm.report.content import (
     share,
 )
 from fecm.report.figures import inside
+from fecm.report.sources import short_deck
+from fecm.results.written import PageOptions
 
 
-def identification_page(name: str, fit: Identification, _digests: Mapping[str, str]) -> ReportPage:
+def identification_page(
+    name: str, fit: Identification, _digests: Mapping[str, str], options: PageOptions
+) -> ReportPage:
     """Return the page about a fit, which has no file. `name` is the name of the measurement."""
-    values = ", ".join(_format_parameter(fit, key) for key in fit.values)
-    verdict = [f"Fitted to {name}: {values}."]
-    level, sentence = VERDICTS[fit.verdict]
-    verdict.append(sentence)
     _, *results = identification_tables(fit)  # the first is judged under Trust
     body = sections(
         [
             ("Trust", [Judgements(tuple(_judgements(fit))), *note_list(fit.notes, "Notes")]),
             ("Results", results),
-            ("Pictures", [_picture(fit)]),
-            ("Provenance", _provenance(fit)),
+            ("Deck", _deck(fit, full=options.full_deck)),
         ]
     )
-    return ReportPage(fit.deck.title or f"Identification from {name}", tuple(verdict), level, body)
+    level, _ = VERDICTS[fit.verdict]
+    names = ", ".join(fit.values)
+    return ReportPage(
+        fit.deck.title or f"Identification from {name}",
+        tuple(_answers(fit)),
+        level,
+        body,
+        subject=f"A fit of {names} to the measured force {name}.",
+        headlines=tuple(_headlines(fit)),
+        first_sheet=(_picture(fit),),
+    )
 
 
-def _format_parameter(fit: Identification, name: str) -> str:
-    """Format a parameter with its standard error."""
-    value = fit.values[name]
-    power, unit = readable(value, fit.unit(name), FITTED_DIGITS)
-    best, error = value / 10.0**power, fit.errors[name] / 10.0**power
-    return f"{name} = {best:.5g} ± {error:.2g} {unit}".rstrip()
+def _answers(fit: Identification) -> Iterator[Answer]:
+    """Say whether the fit is accepted, and the first reason to doubt it."""
+    doubts = fit.doubts or (() if fit.accepted else fit.notes)
+    rest = f": {doubts[0]}" if doubts else ", it describes the measurement"
+    yield Answer("Accepted", fit.verdict, rest)
+
+
+def _headlines(fit: Identification) -> Iterator[Headline]:
+    """Yield the fitted values with their standard errors, and the residual."""
+    for name, value in fit.values.items():
+        unit = fit.unit(name)
+        text = uncertain(value, fit.errors[name], unit)
+        start = f"start {prefixed(fit.start[name], unit, FITTED_DIGITS)}"
+        yield Headline(name, ShownNumber(value, text), (start,))
+    rms = number_with_unit(fit.rms, unit_of("force", fit.units), 3)
+    yield Headline("residual, rms", rms, (f"{100.0 * fit.share:.2g} % of the peak",))
 
 
 def _judgements(fit: Identification) -> Iterator[Judgement]:
@@ -74,10 +95,13 @@ def _picture(fit: Identification) -> PageBlock:
     return PagePicture(inside(picture.figure), caption, caption)
 
 
-def _provenance(fit: Identification) -> Iterator[PageBlock]:
-    """Yield the cards with the fitted values, and the deck."""
+def _deck(fit: Identification, *, full: bool) -> Iterator[PageBlock]:
+    """Yield the checksums of record and deck, the cards with the fitted values, and the deck."""
     text = fit.deck.to_text()
-    checksum = hashlib.sha256(text.encode()).hexdigest()
-    yield from page_table([("fitted deck, SHA-256", checksum)], title="Checksum")
+    rows: list[Row] = []
+    if fit.record.file:
+        rows += [("record", fit.record.file), ("record, SHA-256", fit.record.sha256)]
+    rows.append(("fitted deck, SHA-256", hashlib.sha256(text.encode()).hexdigest()))
+    yield from page_table(rows, title="Checksums")
     yield listing("The fitted cards", fit.cards())
-    yield listing("The fitted deck", text)
+    yield listing("The fitted deck", text if full else short_deck(text))

@@ -1,4 +1,4 @@
-"""Report pages of a run, several runs, a sweep, or a fit."""
+"""Report pages of a run, several runs, a sweep, a fit, or a location."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from fecm.results.written import PageOptions, Reported
 PAGES = {
     "SweepResult": ("fecm.report.sweep", "sweep_page"),
     "Identification": ("fecm.report.identification", "identification_page"),
+    "Location": ("fecm.report.location", "location_page"),
 }
 
 
@@ -31,7 +32,7 @@ def page_of(
     digests: Mapping[str, str] | None = None,
     options: PageOptions | None = None,
 ) -> ReportPage:
-    """Return the page about results by name: one or more runs, one sweep, or one fit.
+    """Return the page about results by name: one or more runs, or one sweep, fit or location.
 
     Raises ReportError if a sweep or a fit is not the only result.
     """
@@ -47,11 +48,13 @@ def _page_of(
     if len(runs) == len(results):
         return run_page(runs, digests or {}, options)
     if len(results) > 1:
-        raise ReportError("a sweep has a page of its own; give one sweep, or results of runs")
+        raise ReportError(
+            "a sweep, a fit or a location has a page of its own; give one, or results of runs"
+        )
     ((name, only),) = results.items()
     module, function = PAGES[type(only).__name__]
     page: Callable[..., ReportPage] = getattr(import_module(module), function)
-    return page(name, only, digests or {})
+    return page(name, only, digests or {}, options)
 
 
 def write_report(

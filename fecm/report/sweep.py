@@ -30,8 +30,10 @@ from fecm.report.content import (
     worst,
 )
 from fecm.report.measured import test_pictures, test_tables
+from fecm.report.sources import short_deck
 from fecm.report.sweep_head import answers, headlines
 from fecm.results.metrics import FACTOR, INTEGERS, RATIO, VERDICTS, described
+from fecm.results.written import PageOptions
 from fecm.sweeps.random import Design
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.statistics import QUANTILES, RandomResult
@@ -45,7 +47,9 @@ MOST_VALUES = 8  # different values of a name that are listed one by one
 MOST_COMBINATIONS = 12  # of varied values, whose statistics are listed
 
 
-def sweep_page(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> ReportPage:
+def sweep_page(
+    name: str, sweep: SweepResult, digests: Mapping[str, str], options: PageOptions
+) -> ReportPage:
     """Return the page about the result of a sweep.
 
     `digests` has the SHA-256 of its file, by its name.
@@ -61,15 +65,16 @@ def sweep_page(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Rep
             ("Results", [*_extremes(sweep), *_convergence(sweep), *_reduced(sweep), *drawn]),
             ("Tests", test_tables(sweep)),
             ("Pictures", pictures[ON_FIRST_SHEET:]),
-            ("Provenance", _provenance(name, sweep, digests)),
+            ("Deck", _deck(name, sweep, digests, full=options.full_deck)),
         ]
     )
-    verdict: tuple[str | Answer, ...] = (*answers(sweep), *_remarks(sweep), _sentence(sweep))
+    verdict: tuple[str | Answer, ...] = (*answers(sweep), *_remarks(sweep))
     return ReportPage(
         sweep.title or name,
         verdict,
         level,
         body,
+        subject=_sentence(sweep),
         headlines=tuple(headlines(sweep)),
         first_sheet=pictures[:ON_FIRST_SHEET],
     )
@@ -305,12 +310,15 @@ def _pictures(name: str, sweep: SweepResult) -> Iterator[PageBlock]:
             PictureKind.EXCEEDANCE, named, f"{what}: probability of exceedance."
         )
         yield from figures.drawn(PictureKind.SENSITIVITY, named, f"{what}: sensitivity indices.")
-        yield from figures.drawn(PictureKind.SCATTER, named, f"{what} over the random values.")
+        scattered = f"{what} over the random values."
+        yield from figures.drawn(PictureKind.SCATTER, named, scattered, wide=True, width="full")
         return
     yield from figures.drawn(PictureKind.MAP, named, f"{what} over the varied values.")
 
 
-def _provenance(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Iterator[PageBlock]:
+def _deck(
+    name: str, sweep: SweepResult, digests: Mapping[str, str], *, full: bool
+) -> Iterator[PageBlock]:
     """Yield checksums, time steps, and the deck."""
     text = sweep.deck_text
     unit = unit_of("time", sweep.units)
@@ -323,4 +331,4 @@ def _provenance(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> It
     if name in digests:
         rows.append(("result, SHA-256", digests[name]))
     yield from page_table(rows, title="Checksums")
-    yield listing("The deck", text)
+    yield listing("The deck", text if full else short_deck(text))

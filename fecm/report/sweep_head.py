@@ -12,7 +12,7 @@ from fecm._table import Cell
 from fecm._typing import Bools, Floats
 from fecm.authoring.values import NAMES
 from fecm.deck.model import Allowables, Impact, Nonlinear
-from fecm.deck.units import quantity, unit_of
+from fecm.deck.units import prefixed, unit_of
 from fecm.judge.limits import EXPOSURE, THRESHOLD
 from fecm.judge.validity import VALID, reasons_of
 from fecm.problem.parts import build_projectile
@@ -21,13 +21,12 @@ from fecm.results.metrics import BAND, EXPOSURES, FACTOR, FOUND_BAND, RATIO, THR
 from fecm.sweeps.measured import RATIOS, comparisons, ratios_in_words
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.search import LEVEL_EXCESS, VELOCITY_ERROR
-from fecm.sweeps.statistics import with_threshold
+from fecm.sweeps.statistics import ROUNDING, with_threshold
 from fecm.sweeps.summary import (
     chance,
     from_threshold_of,
     is_at_threshold,
     limit_answer,
-    range_of,
     reasons,
 )
 
@@ -67,18 +66,18 @@ def _words(name: str) -> str:
 
 def _found(sweep: SweepResult) -> Answer:
     """Say at which energy a search reaches its level, and how well it is bracketed."""
-    energy, velocity = (range_of(sweep, f"found_{name}") for name in ("energy", "velocity"))
+    energy, velocity = (_range(sweep, f"found_{name}") for name in ("energy", "velocity"))
     rest = f" ({velocity})"
     if all(name in sweep.summary for name in FOUND_BAND):
         low, high = (sweep[name][sweep.completed] for name in FOUND_BAND)
         unit = sweep.unit("found_energy")
-        ends = [quantity(float(end), unit, DIGITS) for end in (low.min(), high.max())]
+        ends = [prefixed(float(end), unit, DIGITS) for end in (low.min(), high.max())]
         band = " to ".join(ends) if math.isfinite(high.max()) else "not bounded"
         return Answer("First failure", f"from {energy} on", f"{rest}; finer meshes: {band}")
     rest += f"; bracketed to {_bracket(sweep)}"
     if is_at_threshold(sweep):
         return Answer("Delaminates", f"{from_threshold_of(sweep)} {energy} on", rest)
-    return Answer(f"Peak force {range_of(sweep, 'peak_force')}", f"from {energy} on", rest)
+    return Answer(f"Peak force {_range(sweep, 'peak_force')}", f"from {energy} on", rest)
 
 
 def _bracket(sweep: SweepResult) -> str:
@@ -165,7 +164,7 @@ def _outcome(sweep: SweepResult, question: str, yes: Bools, no: Bools, start: st
     if values is None:
         return Answer(question, answer, undecided)
     least, most = (
-        quantity(float(end(values[mask])), unit, DIGITS) if mask.any() else ""
+        prefixed(float(end(values[mask])), unit, DIGITS) if mask.any() else ""
         for end, mask in ((np.min, yes), (np.max, no))
     )
     if yes.any() and no.any() and values[no].max() >= values[yes].min():
@@ -223,15 +222,14 @@ def headlines(sweep: SweepResult) -> list[Headline]:
         figures += [_figure(sweep, f"found_{name}", name) for name in ("energy", "velocity")]
     elif (energies := impact_energies(sweep)) is not None:
         unit = unit_of(ENERGY, sweep.units)
-        ends = dict.fromkeys(quantity(float(e), unit, DIGITS)
-                             for e in (energies.min(), energies.max()))  # fmt: skip
-        figures.append(Headline("impact energy", " to ".join(ends)))
+        ends = (float(energies.min()), float(energies.max()))
+        figures.append(Headline("impact energy", _together(ends, "to", unit)))
     figures.append(_figure(sweep, "peak_force", "peak force"))
     if THRESHOLD_FORCE in sweep.summary:
         figures.append(_figure(sweep, THRESHOLD_FORCE, "delamination threshold"))
     figures.append(_figure(sweep, "contact_time", "contact"))
     if RATIO in sweep.summary and np.isfinite(sweep[RATIO]).any():
-        figures.append(Headline("deflection", f"{range_of(sweep, RATIO)} h"))
+        figures.append(Headline("deflection", f"{_range(sweep, RATIO)} h"))
     valid = int((sweep.validity == VALID).sum())
     random = sweep.random
     name, count = ("cases", len(sweep)) if random is None else ("draws", random.design.draws)
@@ -239,9 +237,34 @@ def headlines(sweep: SweepResult) -> list[Headline]:
     return figures
 
 
+def _range(sweep: SweepResult, name: str) -> str:
+    """Format the range of a result over the cases, or mean and standard deviation of draws."""
+    unit, random = sweep.unit(name), sweep.random
+    if random is not None and not random.combinations:
+        moments = random.statistics[name]
+        mean, deviation = float(moments.mean), float(moments.standard_deviation)
+        return "open" if math.isnan(mean) else _together((mean, deviation), "±", unit)
+    values = sweep[name][sweep.completed]
+    values = values[np.isfinite(values)]
+    return _together((values.min(), values.max()), "to", unit) if len(values) else "open"
+
+
+def _together(ends: tuple[float, float], word: str, unit: str) -> str:
+    """Format two values with a word between them; one if both are equal or the second is small.
+
+    >>> _together((0.0036, 0.0037), "to", "s"), _together((360.0, 16000.0), "to", "N*mm")
+    ('3.6 to 3.7 ms', '360 mJ to 16 J')
+    """
+    first, second = (prefixed(float(end), unit, DIGITS) for end in ends)
+    if first == second or not abs(ends[1]) > ROUNDING * abs(ends[0]):
+        return first
+    (number, *name), (_, *other_name) = first.split(" ", 1), second.split(" ", 1)
+    return f"{number if name == other_name else first} {word} {second}"
+
+
 def _figure(sweep: SweepResult, name: str, label: str) -> Headline:
     """Return the range of a result over the cases, or mean and standard deviation of draws."""
-    value: Cell = range_of(sweep, name)
+    value: Cell = _range(sweep, name)
     is_mean = sweep.random is not None and not sweep.random.combinations and "±" in value
     known = int(np.isfinite(sweep[name][sweep.completed]).sum())
     remarks = ["mean ± standard deviation"] if is_mean else []
