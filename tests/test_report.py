@@ -26,7 +26,7 @@ from fecm.results.metrics import METRICS
 from fecm.results.onset import energy_at_force
 from fecm.results.summary import run_summary
 from fecm.results.written import PageOptions
-from tests.calls import assert_unusable, call
+from tests.calls import assert_unusable, call, record_of
 from tests.decks import LONG, ROOT, small
 from tests.pages import Page, agrees, read_page
 from tests.test_extensions import Dented
@@ -434,6 +434,7 @@ def test_a_fit_has_a_page(tmp_path: Path) -> None:
         float(text) for text in said.groups()
     ]
     assert "1 % more" in " ".join(actual.captions)
+    assert actual.row("record, SHA-256")[0].text == record_of(tmp_path / "f.csv")["sha256"]
     assert all(agrees(cell) for cell in actual.numbers())
 
 

@@ -56,7 +56,7 @@ def location_page(
 
     `digests` has the SHA-256 of its file, by its name.
     """
-    judged = tuple(_judgements(location))
+    judged = tuple(judgements(location))
     notes = note_list(location.notes, "Notes of the location")
     body = sections(
         [
@@ -137,7 +137,7 @@ def _headlines(location: Location) -> Iterator[Headline]:
         yield Headline("contact", cell, ("until, at least",))
 
 
-def _judgements(location: Location) -> Iterator[Judgement]:
+def judgements(location: Location) -> Iterator[Judgement]:
     """Judge residual, strains, other places, force and mesh by the limits of a location."""
     if location.noise_given:
         size = number_with_unit(location.misfit, digits=3)
