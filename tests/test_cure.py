@@ -38,7 +38,7 @@ from fecm.sweeps import in_full
 from fecm.verification import decks
 from tests.builders import Floats, table
 from tests.calls import assert_unusable, call
-from tests.sound_plate import base
+from tests.sound_plate import base, with_card
 from tests.test_failure_runs import failing
 from tests.test_first_failure import failing as weak
 
@@ -513,6 +513,18 @@ CODES = ("E453", "E454", "W462", "W463", "W464", "W465", "W496")
 )  # fmt: skip
 def test_what_is_wrong_with_a_cure_is_told(card: Cure, code: str, message: str) -> None:
     assert message in messages(card).get(code, "")
+
+
+@pytest.mark.parametrize(
+    ("force", "dt", "blamed"),
+    [("2000.", "-1.", {"W489"}), ("1.", "-450.", {"W463"}), ("500.", "-200.", set())],
+)
+def test_of_preload_and_cure_the_one_that_fails_a_ply_alone_is_blamed(
+    force: str, dt: str, blamed: set[str]
+) -> None:
+    cured = with_card("CURE", f"{dt},", ",.02E-6,22.5E-6", "")(base())
+    findings = load_deck(with_card("PREL", force)(cured)).findings
+    assert {finding.code for finding in findings} & {"W463", "W489"} == blamed
 
 
 def test_a_sound_cure_has_no_findings() -> None:

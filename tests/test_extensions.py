@@ -421,6 +421,7 @@ def test_a_rod_replaces_that_of_a_deck_with_its_own_transducer() -> None:
     own, same = fecm.run_one(long, projectile=short), fecm.run_one(by_card)
     np.testing.assert_array_equal(own.force, same.force)
     np.testing.assert_array_equal(own.history.transducer, same.history.transducer)
+    assert own.attributes["projectile"] == "Rod"
 
 
 def _with_rod(elements: int, node: int) -> fecm.Deck:

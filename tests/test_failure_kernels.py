@@ -215,6 +215,19 @@ def test_what_can_not_rise_is_left_out_without_a_change_of_a_bit(
         np.testing.assert_array_equal(histories.largest.state, every.largest.state)
 
 
+@pytest.mark.parametrize("monitor", one_laminate(stretches=True), ids=["compiled", "numpy"])
+def test_an_exposure_that_is_reached_again_keeps_the_time_of_the_first(
+    monitor: FailureMonitor,
+) -> None:
+    (field,) = fields(plate(), 1, stretched=True)
+    envelope = history(monitor, np.stack([0.0 * field, field, (1.0 + 1e-12) * field]))
+    for part in (envelope.plies, envelope.interfaces):
+        np.testing.assert_array_equal(part.time, 2.0)
+    at_rest = history(monitor, 0.0 * field[None])
+    for part in (at_rest.plies, at_rest.interfaces):
+        np.testing.assert_array_equal(part.time, 0.0)
+
+
 def test_a_state_that_can_not_rise_is_not_evaluated() -> None:
     compiled, _ = one_laminate(stretches=True)
     (field,) = fields(plate(), 1, stretched=True)

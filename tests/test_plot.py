@@ -303,6 +303,11 @@ def test_plans_of_the_plate_draw_the_circle_of_the_patch(kind: str) -> None:
     assert [float(value[0]) for value in cross] == [1.5, 1.5]
 
 
+def test_the_legend_of_the_mesh_names_the_circle_of_the_patch() -> None:
+    figure = plot(run(small(data=DISC + DATA_CARDS)), "mesh")
+    assert legend_of(figure)[-2:] == ["impact", "contact patch"]
+
+
 @pytest.mark.parametrize(("kind", "count"), [("line", 6), ("contour", 4)])
 def test_times_are_chosen_before_the_contact_ends_and_at_equal_distances(
     result: Result, kind: str, count: int

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import re
 import sys
@@ -118,10 +119,15 @@ def _line_at_begin_and_end(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("_line_at_begin_and_end")
-def test_a_sweep_a_search_and_a_run_in_full_say_how_far_they_are(tmp_path: Path) -> None:
+def test_a_sweep_a_search_and_a_run_in_full_say_how_far_they_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seconds = itertools.count(1000.0, 4.0)  # at the begin, and at each of the two lines
+    monkeypatch.setattr("fecm.cli.sweep.time", SimpleNamespace(monotonic=lambda: next(seconds)))
     (tmp_path / "d.inp").write_text(small())
     swept = call("sweep", "d.inp", "--vary", "k=1e6,2e6", "--full", 1, "-o", "s.h5", cwd=tmp_path)
     assert re.findall(r"^fecm: (\d) of 2 done after 1 min", swept.stderr, re.M) == ["0", "2"]
+    assert "2 of 2 done after 1 min, 0.25 cases a second\n" in swept.stderr
     assert re.search(r"^fecm: case 1 is run in full, 1 min so far$", swept.stderr, re.M)
     find = ("--find", "velocity", "--until", "peak_force=1")
     answer = call("sweep", "d.inp", *find, "-o", "f.h5", cwd=tmp_path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import csv
 import re
 import warnings
@@ -521,6 +522,14 @@ def test_bad_arguments_are_named(arguments: dict[str, Any], told: str) -> None:
     deck = None if "build" in arguments else fecm.read_one(small())
     with pytest.raises(CasesError, match=told):
         fecm.sweep(deck, **arguments)
+
+
+def test_the_mapping_that_the_message_about_random_shows_is_one() -> None:
+    with pytest.raises(CasesError) as refused:
+        fecm.sweep(small(), random={})
+    shown = ast.literal_eval(str(refused.value).partition("such as ")[2])
+    swept = fecm.sweep(small(), random=shown, samples=16)
+    assert swept.random is not None
 
 
 def test_an_incomplete_file_is_refused(folder: Path) -> None:

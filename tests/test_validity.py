@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 import fecm
 from fecm import Result
+from fecm.listing.slips import Mode
 from tests.calls import call
 from tests.decks import APPENDIX, MESH, PROGRAM, ROOT, small
 
@@ -192,3 +193,16 @@ def test_gravity_is_said_to_add_what_a_falling_mass_on_a_spring_shows(
     share, rise = (float(text) for text in re.findall(r"([\d.]+)%", said[0]))
     assert share == pytest.approx(100.0 * mass * 9806.65 * way / energy, abs=0.06)
     assert rise == pytest.approx(100.0 * (forces[1] / forces[0] - 1.0), abs=0.6)
+
+
+@pytest.mark.parametrize(
+    ("k", "mode", "noted"), [(1e8, "report", False), (5e8, "report", True), (5e8, "listing", False)]
+)
+def test_contacts_that_do_not_converge_are_counted_in_a_note_unless_slips_excuse_them(
+    k: float, mode: Mode, noted: bool
+) -> None:
+    result = fecm.run_one(fecm.read_one(small()).with_(k=k), mode=mode)
+    count = result.attributes_of("history")["unsettled_steps"]
+    assert (count > 0) is (k > 1e8)
+    notes = [note for note in result.attributes["notes"] if "did not converge" in note]
+    assert [f"in {count} steps" in note for note in notes] == [True] * noted
