@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.authoring.contact import Sphere, doubts_of_soft_tip
 from fecm.cli.new import new_command as command
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.model import Delamination, Impact, Material, Nonlinear, Shear
@@ -148,6 +149,16 @@ def test_a_bare_number_that_is_small_for_an_energy_is_doubted() -> None:
     assert "note: the energy is 0.01 J, 0.0023 J per mm of thickness, " + doubt in bare.stderr
     for meant in ("10mJ", "10J", "10000"):
         assert "unless it has a unit" not in new(*plate, "--energy", meant).stderr
+
+
+def test_a_patch_is_doubted_that_the_contact_circle_of_a_soft_tip_outgrows() -> None:
+    # 10 J on k = 97.8 indent by (2.5 E/k)^0.4 = 9.19, and the circle's radius is (8 * 9.19)^(1/2).
+    def doubts(radius: float, modulus: float) -> int:
+        tip = Sphere(8.0, modulus, 0.48)
+        return len(doubts_of_soft_tip(tip, "mm-N-s", radius, 97.8, 1e4, 10.3e3))
+
+    assert [doubts(radius, 20.0) for radius in (0.5, 2.0, 8.0, 20.0)] == [1, 1, 0, 0]
+    assert doubts(0.5, 2.1e5) == 0
 
 
 @pytest.mark.long
