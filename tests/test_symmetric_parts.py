@@ -234,7 +234,7 @@ def test_a_page_has_the_numbers_of_the_whole_plate(tmp_path: Path) -> None:
     run("linear", "quarter").report(tmp_path / "quarter.html")
     page = (tmp_path / "quarter.html").read_text()
     peak = f"{run('linear').force.max():.4g}"
-    assert "Quarter model: forces, energies and masses are those of the whole plate" in page
+    assert "quarter model: forces, energies and masses are those of the whole plate" in page
     assert page.count(peak) >= 2
     assert "A mass of 20 g at 8000 mm/s (640 mJ) on a plate of 100 × 80 mm" in page
 
