@@ -226,7 +226,7 @@ def test_a_fit_with_a_doubt_says_so_in_table_json_and_page() -> None:
     assert doubted_fit.verdict == doubted_fit.to_dict()["verdict"] == "with doubts"
     assert "; accepted with doubts\n" in str(doubted_fit)
     page = page_of({"measured": doubted_fit})
-    assert page.verdict[-1] == "The fit is accepted with doubts: see Trust."
+    assert page.verdict[-1] == ("Accepted", "with doubts", ": a reason")
     assert page.level.value == "doubtful"
 
 

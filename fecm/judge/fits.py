@@ -6,7 +6,7 @@ Each reason to reject or to doubt a fit is a row with its limit and its words.
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Literal, TypeAlias
 
 from fecm.judge.limits import ModelLimit, TrustLevel
 
@@ -80,21 +80,11 @@ DOUBTFUL_RUN = ModelLimit(
 )
 
 Verdict: TypeAlias = Literal["yes", "with doubts", "no"]
-
-
-class VerdictMeaning(NamedTuple):
-    """What a verdict on a fit means."""
-
-    level: TrustLevel
-    sentence: str
-
-
-VERDICTS: dict[Verdict, VerdictMeaning] = {
-    "yes": VerdictMeaning(TrustLevel.WITHIN, "The fit is accepted: it describes the measurement."),
-    "with doubts": VerdictMeaning(
-        TrustLevel.DOUBTFUL, "The fit is accepted with doubts: see Trust."
-    ),
-    "no": VerdictMeaning(TrustLevel.OUTSIDE, "The fit is not accepted: see Trust."),
+# Trust in the values of a fit.
+VERDICTS: dict[Verdict, TrustLevel] = {
+    "yes": TrustLevel.WITHIN,
+    "with doubts": TrustLevel.DOUBTFUL,
+    "no": TrustLevel.OUTSIDE,
 }
 
 

@@ -43,12 +43,11 @@ def identification_page(
             ("Deck", _deck(fit, full=options.full_deck)),
         ]
     )
-    level, _ = VERDICTS[fit.verdict]
     names = ", ".join(fit.values)
     return ReportPage(
         fit.deck.title or f"Identification from {name}",
         tuple(_answers(fit)),
-        level,
+        VERDICTS[fit.verdict],
         body,
         subject=f"A fit of {names} to the measured force {name}.",
         headlines=tuple(_headlines(fit)),
@@ -77,7 +76,7 @@ def _headlines(fit: Identification) -> Iterator[Headline]:
 def _judgements(fit: Identification) -> Iterator[Judgement]:
     """Judge convergence and residual."""
     yield NOT_CONVERGED.judgement("yes" if fit.converged else "no", beyond=not fit.converged)
-    yield Judgement(VERDICTS[fit.verdict].level, "accepted", fit.verdict)
+    yield Judgement(VERDICTS[fit.verdict], "accepted", fit.verdict)
     force = unit_of("force", unit_names(fit.deck))
     yield Judgement(
         TrustLevel.UNJUDGED, "residual, rms", number_with_unit(fit.rms, force), "noise and model"
