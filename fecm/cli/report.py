@@ -10,26 +10,46 @@ from click import option
 
 from fecm.cli.common import RefusedError, echo_path
 from fecm.cli.isolation import reads
-from fecm.cli.options import NAMED_PATH, GroupedCommand, groups_of, job_options, typical
+from fecm.cli.options import (
+    DECK_PATH,
+    NAMED_PATH,
+    Finite,
+    GroupedCommand,
+    groups_of,
+    job_options,
+    list_of,
+    typical,
+)
 from fecm.cli.plot import loaded_result, named
 from fecm.report.content import check_page
 from fecm.results.hdf5_reader import read
 from fecm.results.schema import Form
-from fecm.results.written import HEAD, OTHER, PageOptions
+from fecm.results.written import HEAD, MEASURED, OTHER, PageOptions
+
+PAIR = list_of("TIME,FORCE", click.STRING, [2])
 
 
 @click.command(
     "report",
     cls=GroupedCommand,
-    groups=groups_of(PageOptions, {HEAD: [], OTHER: []}),
+    groups=groups_of(PageOptions, {HEAD: [], MEASURED: [], OTHER: []}),
     epilog=typical(
         "fecm report impact-patch.h5",
         'fecm report impact-patch.h5 --client "Example Ltd" --specimen 117 --date 2026-11-28',
+        "fecm report impact-patch.h5 --measured measured-force.csv",
         "fecm report thin.h5 thick.h5 -o comparison.html",
     ),
 )
 @click.argument("results", type=NAMED_PATH, nargs=-1, required=True, metavar="RESULT...")
-@job_options(PageOptions, logo={"type": NAMED_PATH})
+@job_options(
+    PageOptions,
+    logo={"type": NAMED_PATH},
+    measured={"type": DECK_PATH},
+    columns={"type": PAIR},
+    units={"type": PAIR},
+    delay={"type": Finite()},
+    offset={"type": Finite()},
+)
 @option(
     "-o",
     "--output",
@@ -54,7 +74,7 @@ def report_command(
     """
     path = output or Path(f"{results[0].stem}.html")
     page_options = PageOptions(**options)
-    inputs = [*results, *filter(None, [options["logo"]])]
+    inputs = [*results, *filter(None, [options["logo"], options["measured"]])]
     check_page(path, overwrite, inputs)
     from fecm.report.report import digest, write_report
 

@@ -98,17 +98,17 @@ def arranged(name: str, result: Result, problem: Problem) -> Iterator[PageBlock]
     yield PagePicture(inside(figure), caption, caption)
 
 
-def forces(results: Mapping[str, Result]) -> Iterator[PageBlock]:
-    """Yield the contact forces of one or more runs in one picture."""
+def forces(results: Mapping[str, Result], **overlay: Any) -> Iterator[PageBlock]:
+    """Yield the contact forces of one or more runs in one picture, with a measured force."""
     caption = _with_peaks("Contact force against time.", results)
-    yield from drawn(PictureKind.FORCE, results, caption)
+    yield from drawn(PictureKind.FORCE, results, caption, **overlay)
 
 
-def force(name: str, result: Result) -> Iterator[PageBlock]:
-    """Yield the contact force of one run, with its first failure."""
+def force(name: str, result: Result, **overlay: Any) -> Iterator[PageBlock]:
+    """Yield the contact force of one run, with its first failure and a measured force."""
     with rc_context(STYLE), warnings.catch_warnings(action="ignore"):
         try:
-            picture = draw(PictureKind.FORCE, {name: result}, STYLE)
+            picture = draw(PictureKind.FORCE, {name: result}, STYLE, **overlay)
         except PlotError:
             return
         (axes, *_) = picture.figure.axes

@@ -47,6 +47,8 @@ def _page_of(
     runs = {name: result for name, result in results.items() if isinstance(result, Result)}
     if len(runs) == len(results):
         return run_page(runs, digests or {}, options)
+    if options.measured is not None:
+        raise ReportError("a measured force is compared with results of runs only")
     if len(results) > 1:
         raise ReportError(
             "a sweep, a fit or a location has a page of its own; give one, or results of runs"

@@ -6,6 +6,7 @@ import hashlib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,7 @@ from fecm.report.content import (
     worst,
 )
 from fecm.report.first_sheet import answers, has_impact, headlines, limits, scene
+from fecm.report.measured_force import compare_forces, overlay_of, with_measured_force
 from fecm.report.model import of_problem
 from fecm.report.sources import assumptions, command_of, short_deck, sources
 from fecm.report.subject import impactor, plate_extent
@@ -77,20 +79,23 @@ def run_page(
     loaded = {name: deck_problem(result) for name, result in results.items()}
     problems = {name: problem for name, (problem, _) in loaded.items()}
     judged = {name: list(judgements(result, problems[name])) for name, result in results.items()}
+    compared = compare_forces(results, options)
     level = worst(judgement for judgements_of in judged.values() for judgement in judgements_of)
     if level is TrustLevel.WITHIN and any(result.notes for result in results.values()):
         level = TrustLevel.DOUBTFUL
     if len(results) == 1:
         ((name, result),) = results.items()
-        page = _single(name, result, *loaded[name], judged[name], level)
+        page = _single(name, result, *loaded[name], judged[name], level, overlay_of(options))
     else:
         title = f"{len(results)} impacts: {', '.join(results)}"
         sentences = (
             f"{name}: {_sentence(judgement, problems[name])}" for name, judgement in results.items()
         )
-        body = _several(results, problems, judged)
+        body = _several(results, problems, judged, overlay_of(options))
         page = ReportPage(title, (*sentences, WORDS[level]), level, body)
     last = sections([("Deck", _decks(results, digests, full=options.full_deck))])
+    if compared is not None:
+        page = with_measured_force(page, compared, options)
     return page._replace(sections=(*page.sections, *last))
 
 
@@ -101,6 +106,7 @@ def _single(
     warnings: list[str],
     judged: list[Judgement],
     level: TrustLevel,
+    overlay: Mapping[str, Any],
 ) -> ReportPage:
     """Return the page about one result, without its deck."""
     named = {name: result}
@@ -129,7 +135,7 @@ def _single(
         headlines=tuple(headlines(result, problem)),
         first_sheet=(
             *([] if problem is None else figures.arranged(name, result, problem)),
-            *figures.force(name, result),
+            *figures.force(name, result, **overlay),
             *note_list(limits(result.notes, judged), "What limits these figures, worst first"),
         ),
     )
@@ -147,6 +153,7 @@ def _several(
     results: Mapping[str, Result],
     problems: Mapping[str, Problem | None],
     judged: Mapping[str, list[Judgement]],
+    overlay: Mapping[str, Any],
 ) -> tuple[PageSection, ...]:
     """Return the sections about several results, with a column for each."""
     trust: list[PageBlock] = []
@@ -163,17 +170,17 @@ def _several(
         [
             ("Trust", trust),
             ("Results", _results(results)),
-            ("Pictures", _common_pictures(results)),
+            ("Pictures", _common_pictures(results, overlay)),
             ("Model", page_table(rows, ("quantity", *results))),
         ]
     )
 
 
-def _common_pictures(results: Mapping[str, Result]) -> list[PageBlock]:
+def _common_pictures(results: Mapping[str, Result], overlay: Mapping[str, Any]) -> list[PageBlock]:
     """Draw the histories of all results in the same pictures, if their units are the same."""
     if len({tuple(result.units.items()) for result in results.values()}) > 1:
         return note_list(["The results have different units: they have no pictures in common."])
-    return [*figures.forces(results), *figures.of_runs(results)]
+    return [*figures.forces(results, **overlay), *figures.of_runs(results)]
 
 
 def _model_row(result: Result, problem: Problem | None) -> dict[str, Cell]:

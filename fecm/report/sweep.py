@@ -29,7 +29,7 @@ from fecm.report.content import (
     share,
     worst,
 )
-from fecm.report.measured import test_pictures, test_tables
+from fecm.report.measured_cases import test_pictures, test_tables
 from fecm.report.sources import short_deck
 from fecm.report.sweep_head import answers, headlines
 from fecm.results.metrics import FACTOR, INTEGERS, RATIO, VERDICTS, described

@@ -16,6 +16,7 @@ from fecm._record_faults import record_faults
 from fecm._typing import Floats
 from fecm.results.stored import Stored
 
+LEAST = 0.05  # of the peak, above which there is a contact
 TRIGGER = 0.2  # time between two rises, over the time above half of the peak
 
 # A CSV file, or times and forces.
@@ -70,6 +71,8 @@ class Comparison:
         Largest forces.
     impulse, measured_impulse : float
         Time integrals of the forces, linear between the points.
+    duration, measured_duration : float
+        Times from the first to the last point at which the forces exceed 5 % of their peaks.
     rms : float
         Root of the mean square of the difference, force.
     correlation : float
@@ -87,6 +90,8 @@ class Comparison:
     measured_peak: float
     impulse: float
     measured_impulse: float
+    duration: float
+    measured_duration: float
     rms: float
     correlation: float
     units: Mapping[str, str]
@@ -192,6 +197,12 @@ def _doubt_trigger(stored: Stored, measured: Measurement, clock: Floats) -> None
         )
 
 
+def _duration(time: Floats, force: Floats) -> float:
+    """Return the time from the first to the last point at which a force is well above zero."""
+    above = time[force > LEAST * max(float(force.max()), 0.0)]
+    return float(above[-1] - above[0]) if len(above) else 0.0
+
+
 def compare_force(stored: Stored, measured: Measurement) -> Comparison:
     """Compare the force on the whole plate with a measured force, at the measured times of the run.
 
@@ -223,6 +234,8 @@ def compare_force(stored: Stored, measured: Measurement) -> Comparison:
         measured_peak=float(force.max()),
         impulse=float(weights @ interpolated),
         measured_impulse=float(weights @ force),
+        duration=_duration(time, interpolated),
+        measured_duration=_duration(time, force),
         rms=float(np.sqrt(np.mean((interpolated - force) ** 2))),
         correlation=float(np.corrcoef(interpolated, force)[0, 1]) if varies else math.nan,
         units=stored.units,

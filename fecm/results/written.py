@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fecm._files import check_outputs
 from fecm._methods import function_of
 from fecm._options import described_by, documented, option
 
+if TYPE_CHECKING:
+    from fecm.results.comparison import Source
+
 HEAD = "Head of the page"  # group of options
+MEASURED = "Measured force"
 OTHER = "Other options"
 
 
@@ -36,6 +42,35 @@ class PageOptions:
     )
     logo: str | Path | None = option(
         None, "Picture beside the title: .png, .jpg or .svg.", group=HEAD, metavar="FILE"
+    )
+    measured: Source | None = option(
+        None,
+        "Measured force that the page compares with the run: columns time and force (or "
+        "transducer).",
+        python="A CSV file, or times and forces.",
+        group=MEASURED,
+        metavar="FILE.csv",
+    )
+    columns: Sequence[str] | None = option(
+        None,
+        "Names or numbers (from 1) of its columns of time and force; a minus before one changes "
+        "its sign.",
+        default_text="the usual names",
+        group=MEASURED,
+        metavar="TIME,FORCE",
+    )
+    units: Sequence[str] | None = option(
+        None,
+        "Its units of time and force, if it names none, such as ms,kN.",
+        default_text="the deck's",
+        group=MEASURED,
+        metavar="TIME,FORCE",
+    )
+    delay: float = option(
+        0.0, "Its time of the first contact, subtracted.", group=MEASURED, metavar="TIME"
+    )
+    offset: float = option(
+        0.0, "Its force without a contact, subtracted.", group=MEASURED, metavar="FORCE"
     )
     full_deck: bool = option(
         False, "Show all cards of the deck, nodes and elements too.", group=OTHER
@@ -103,6 +138,11 @@ class Reported(ABC):
         specimen: str | None = None,
         date: str | None = None,
         logo: str | Path | None = None,
+        measured: Source | None = None,
+        columns: Sequence[str] | None = None,
+        units: Sequence[str] | None = None,
+        delay: float = 0.0,
+        offset: float = 0.0,
         full_deck: bool = False,
     ) -> None:
         """Write an HTML page to hand on, as ``fecm report`` and ``fecm identify --report`` do.
@@ -121,7 +161,10 @@ class Reported(ABC):
         Raises
         ------
         ReportError
-            If the name has another suffix, or the logo is no picture that fits.
+            If the name has another suffix, the logo is no picture that fits, or a measured force
+            is given for something else than a run.
+        StudyError
+            If the measured force is invalid.
         FileExistsError
             If the file exists and may not be replaced.
         ImportError
@@ -139,6 +182,11 @@ class Reported(ABC):
             specimen=specimen,
             date=date,
             logo=logo,
+            measured=measured,
+            columns=columns,
+            units=units,
+            delay=delay,
+            offset=offset,
             full_deck=full_deck,
         )
         write_report = function_of("Result.report")
