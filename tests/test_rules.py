@@ -400,6 +400,9 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
         + MATS
         + DATA_CARDS.replace("    2  90.     0.053", "    2  90.     0.053    2")
     ),
+    "W564": lambda: with_card("PREL", "500.")(
+        with_card("CURE", "-200.,", ",.02E-6,22.5E-6", "")(base())
+    ),
     "W463": plate(with_card("CURE", "-400.,", ",.02E-6,22.5E-6", "")),
     "W464": more("CURE\n-200.,\n,.02E-6,22.5E-6\n\n"),
     "W496": plate(with_card("CURE", ",.5", ",.02E-6,22.5E-6,,.6", "")),

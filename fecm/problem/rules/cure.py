@@ -164,6 +164,28 @@ def cracks_at_rest(problem: Problem, card: model.Cure) -> Reports:
         yield Report(message, card.place(), hint)
 
 
+@rule("W564", Subject.DAMAGE)
+def cracks_at_rest_under_preload(problem: Problem, card: model.Cure) -> Reports:
+    """The preload and the residual stresses together fail a ply.
+
+    Neither fails it alone. A criterion of FAIL is at 1 or above before anything moves.
+
+    Remedy: A smaller preload, the values of CURE and ALLO, or another layup.
+    """
+    worst = problem.worst_under()
+    if worst is None or worst[0].exposure < 1.0:
+        return
+    alone = problem.worst_under(preload=False), problem.worst_under(cure=False)
+    if not any(part is not None and part[0].exposure >= 1.0 for part in alone):
+        exposure, laminate = worst
+        where = exposed(problem.deck, laminate, exposure)
+        message = (
+            f"The preload and the residual stresses of CURE together reach exposure "
+            f"{exposure.exposure:.3g} before any load: {where}."
+        )
+        yield Report(message, card.place(), "PREL is a force per length, tension positive")
+
+
 @rule("W551", Subject.LAMINATE)
 def exchanged_expansions(problem: Problem, card: model.Cure) -> Reports:
     """A ply of parallel fibres expands more along the fibres than across them.
@@ -283,6 +305,7 @@ VALUES = (
     exchanged_expansions,
     expansion_per_fahrenheit,
     cracks_at_rest,
+    cracks_at_rest_under_preload,
     warped_plate,
     cure_without_stresses,
 )
