@@ -196,6 +196,42 @@ def test_a_page_is_the_same_without_scripts(
     assert without == with_scripts
 
 
+@pytest.mark.parametrize(("width", "columns"), [(390, 2), (1400, 6), (PAPER[0], 6)])
+def test_the_figures_of_the_first_sheet_stand_in_columns(
+    pages: dict[str, Path], browser: Browser, width: int, columns: int
+) -> None:
+    browser.open(pages["d7136"], width=width, media="print" if width == PAPER[0] else "screen")
+    lefts = browser.value(
+        '[...document.querySelectorAll(".headlines > div")].map(one => '
+        "Math.round(one.getBoundingClientRect().left))"
+    )
+    assert len(lefts) == 6
+    assert len(set(lefts)) == columns
+
+
+def test_a_run_takes_at_most_eight_sheets_and_its_answers_stand_on_the_first(
+    pages: dict[str, Path], browser: Browser
+) -> None:
+    pypdf = pytest.importorskip("pypdf", reason="pypdf reads the printed page")
+    browser.open(pages["d7136"], width=PAPER[0], media="print")
+    sheets = pypdf.PdfReader(io.BytesIO(browser.pdf())).pages
+    assert len(sheets) <= 8
+    first, second = (packed(sheet.extract_text()) for sheet in sheets[:2])
+    for said in ("Delaminates:", "Firstfailure:", "peakforce", "Whatlimitsthesefigures"):
+        assert said in first
+    assert "Assumptionsandsources" in second
+
+
+def test_the_contents_lead_to_every_section(pages: dict[str, Path], browser: Browser) -> None:
+    browser.open(pages["d7136"])
+    titles = browser.value(
+        '[...document.querySelectorAll("nav a")].map(one => '
+        "[one.textContent, document.querySelector(one.hash).textContent])"
+    )
+    assert len(titles) >= 5
+    assert all(link == heading for link, heading in titles)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_on_paper_no_row_is_cut_and_no_picture(
     pages: dict[str, Path], browser: Browser, kind: str

@@ -91,11 +91,11 @@ def test_figures_of_the_first_sheet_are_those_of_the_result(failed: Result, show
     metrics, threshold = failed.metrics, float(failed.threshold["force"])
     first = first_failures(failed)[0]
     values = {name: shown.term(name)[0].value for name in (
-        "peak force", "delamination threshold", "energy for it", "contact", "first ply fails"
+        "peak force", "threshold", "energy for it", "contact", "first ply fails"
     )}  # fmt: skip
     assert values == {
         "peak force": metrics["peak_force"],
-        "delamination threshold": threshold,
+        "threshold": threshold,
         "energy for it": energy_at_force(failed, threshold),
         "contact": metrics["contact_time"],
         "first ply fails": first.force,

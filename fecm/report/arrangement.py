@@ -61,6 +61,8 @@ def arrangement(name: str, result: Result, problem: Problem, hits: Impactor) -> 
         length.name(section.xaxis, "$x$")
         layers = list(problem.deck.layers.values())[problem.laminate_number]
         draw_stack(axes["plies"], layers, material_names(problem.deck), high)
+        depth = style.scale_of({name: result}, "length", [np.array([problem.laminate.thickness])])
+        depth.name(axes["plies"].yaxis, "Depth")
         style.lines_legend(figure, plate)
     return figure
 
@@ -121,4 +123,3 @@ def draw_stack(
     axes.set_ylim(edges[-1], 0.0)
     axes.set_xticks([])
     axes.spines["bottom"].set_visible(False)
-    axes.set_title("depth", loc="left")

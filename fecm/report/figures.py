@@ -59,10 +59,10 @@ def _is_large(figure: Figure) -> bool:
 def _bytes(figure: Figure, form: str) -> bytes:
     """Return a figure in a format. Equal figures give equal bytes."""
     file = io.BytesIO()
-    if (engine := figure.get_layout_engine()) is not None:
-        engine.execute(figure)  # once; saving a figure with a layout engine draws it twice
-        figure.set_layout_engine(None)
     with rc_context(STYLE), warnings.catch_warnings(action="ignore"):
+        if (engine := figure.get_layout_engine()) is not None:
+            engine.execute(figure)  # once; saving a figure with a layout engine draws it twice
+            figure.set_layout_engine(None)
         save(figure, file, f".{form}", DOTS)
     return file.getvalue()
 
@@ -192,4 +192,5 @@ def stack(layers: Sequence[Layer], names: Mapping[int, str]) -> Figure:
     with rc_context(STYLE):
         figure, (axes,) = panels("column", ratio=height / WIDTH)
         draw_stack(axes, layers, names, height)
+        axes.set_ylabel("depth from the struck face")
     return figure

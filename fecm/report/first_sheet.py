@@ -145,7 +145,7 @@ def _threshold(result: Result) -> list[Headline]:
     if not result.threshold:
         no_card = ("the deck has no DELA",)
         return [
-            Headline("delamination threshold", UNKNOWN, no_card),
+            Headline("threshold", UNKNOWN, no_card),
             Headline("energy for it", UNKNOWN),
         ]
     threshold = result.threshold
@@ -166,7 +166,7 @@ def _threshold(result: Result) -> list[Headline]:
     elif result.end not in OPEN_PEAKS:
         about = ["fecm estimate has it"]
     return [
-        Headline("delamination threshold", _cell(result, force, "force"), tuple(remarks)),
+        Headline("threshold", _cell(result, force, "force"), tuple(remarks)),
         Headline("energy for it", shown, tuple(about)),
     ]
 
@@ -228,8 +228,8 @@ def limits(notes: Iterable[str], judged: Iterable[Judgement]) -> list[str]:
     for judgement in judged:
         if judgement.level in lines and not judgement.noted:
             size = judgement.size if isinstance(judgement.size, str) else judgement.size.text
-            about = f": {judgement.words}" if judgement.words else ""
-            lines[judgement.level].append(f"{judgement.name} {size}{about}")
+            text = f"{judgement.name}: {size}"
+            lines[judgement.level].append("; ".join(filter(None, [text, judgement.words])))
     return [*lines[TrustLevel.OUTSIDE], *notes, *lines[TrustLevel.DOUBTFUL]]
 
 

@@ -176,12 +176,11 @@ def _impact(result: Result, deck: model.Deck) -> Iterator[Row]:
 
 
 def _program(problem: Problem) -> Iterator[Row]:
-    """Yield rows about the time steps and the words of the macro program."""
+    """Yield rows about the time steps."""
     steps = [m.value for m in flat(problem.program) if m.word == "DT"]
     yield "impact steps", ShownNumber(problem.work.steps, str(problem.work.steps))
     if steps:
         yield "time step", _in_units(problem.deck, max(steps), "time")
-    yield "macros", " ".join(dict.fromkeys(m.word for m in flat(problem.program)))
 
 
 def _in_units(deck: model.Deck, value: float, dimension: str) -> Cell:
