@@ -35,6 +35,7 @@ from fecm.deck.findings import FindingJson
 from fecm.problem.summary import ProblemSummary
 from fecm.results.difference import DifferenceJson, PositionJson
 from fecm.results.summary import MetricsJson
+from fecm.sweeps.about import SweepJson
 from fecm.sweeps.mesh_error import MeshErrorEstimate
 
 Schema = dict[str, Any]
@@ -70,6 +71,7 @@ OUTPUTS: dict[str, tuple[str, list[type]]] = {
         [FindingJson, ProblemSummary, MeshErrorEstimate],
     ),
     "run": ("A line of `fecm run --format json`, one for each problem", [ProblemRunJson]),
+    "sweep": ("Output of `fecm sweep --format json`", [SweepJson]),
     "info": ("Output of `fecm info --format json`", [RunFileJson, SweepFileJson, LocationFileJson]),
     "diff": ("Output of `fecm diff --format json`", [DifferenceJson]),
 }

@@ -8,8 +8,10 @@ imported when the command is called.
 from __future__ import annotations
 
 import errno
+import functools
 import logging
 import os
+import re
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
@@ -24,6 +26,7 @@ from fecm._watch import StoppedError
 from fecm.cli import isolation, streams
 from fecm.cli.common import INTERRUPTED, UNUSABLE, echo, note, with_options
 from fecm.cli.interrupts import SIGNALLED, signals
+from fecm.cli.terminal import add_output_options, output_options, terminal
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -82,8 +85,44 @@ GROUPED = {
         ),
         "waves": LazyCommand("fecm.cli.waves", "Waves in a laminate."),
     },
+    "Help": {
+        "help": LazyCommand("fecm.cli.help", "Show the help page of a command."),
+        "completion": LazyCommand("fecm.cli.help", "Print the completion script of a shell."),
+    },
 }
 COMMANDS = {name: command for commands in GROUPED.values() for name, command in commands.items()}
+# Names that people type, by the command that they mean.
+OTHER_NAMES = {
+    "new": ("init", "create", "generate", "setup"),
+    "run": ("simulate", "solve", "compute", "start"),
+    "check": ("validate", "lint"),
+    "info": ("show", "inspect", "describe", "summary"),
+    "plot": ("draw", "figure", "view"),
+    "diff": ("compare", "cmp"),
+    "export": ("convert", "csv", "vtk"),
+    "sweep": ("find", "search", "random", "vary"),
+    "identify": ("fit", "calibrate"),
+    "fmt": ("format",),
+    "estimate": ("threshold", "energy"),
+}
+
+
+def suggestion(name: str) -> str:
+    """Return the end of the message about an unknown command: the command that is probably meant.
+
+    A name of several words, such as plot-force, means the command that is one of them.
+    """
+    meant = {word: command for command, words in OTHER_NAMES.items() for word in words}
+    for word in re.split(r"[-_ ]", name.lower()):
+        if (command := meant.get(word, word)) in COMMANDS:
+            return f"; did you mean {command}?"
+    return did_you_mean(name, COMMANDS)
+
+
+@functools.cache
+def _imported(name: str, module: str) -> click.Command:
+    """Import a command, and give it the options that all commands have."""
+    return add_output_options(getattr(import_module(module), f"{name}_command"))
 
 
 class LazyGroup(click.Group):
@@ -97,8 +136,7 @@ class LazyGroup(click.Group):
         """Import a command."""
         if (command := COMMANDS.get(cmd_name)) is None:
             return None
-        loaded: click.Command = getattr(import_module(command.module), f"{cmd_name}_command")
-        return loaded
+        return _imported(cmd_name, command.module)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -106,7 +144,7 @@ class LazyGroup(click.Group):
         """Find a command; for an unknown one, suggest the most similar name."""
         name = args[0]
         if not (name in COMMANDS or name.startswith("-") or ctx.resilient_parsing):
-            ctx.fail(f"there is no command {name!r}{did_you_mean(name, COMMANDS)}")
+            ctx.fail(f"there is no command {name!r}{suggestion(name)}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -141,9 +179,13 @@ def cli() -> None:
     """
 
 
+cli.params += output_options()
+
+
 def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoReturn:
     """Run the command line and leave with its exit status."""
     signals.install()
+    terminal.reset()
     streams.guard_streams()
     isolation.enabled = arguments is None
     warnings.showwarning = _show_warning

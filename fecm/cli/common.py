@@ -20,6 +20,7 @@ from fecm._table import Part, Summary, summary_lines
 from fecm._text import jsonable, printable
 from fecm._watch import MINUTE, Watch
 from fecm.cli.interrupts import signals
+from fecm.cli.terminal import terminal, with_colored_head
 
 # Exit statuses.
 FAILED = 1  # a check
@@ -55,13 +56,21 @@ def echo(text: object = "", *, err: bool = False, **style: Any) -> None:
     :func:`click.style`.
     """
     lines = [printable(line) for line in str(text).split("\n")]
-    shown = "\n".join(map(_shortened, lines) if err else lines)
+    if err:
+        lines = [_shortened(line) for line in lines]
+    color = terminal.uses_color(sys.stderr if err else sys.stdout)
+    if color and err:
+        lines = [with_colored_head(line) for line in lines]
+    shown = "\n".join(lines)
     with contextlib.suppress(OSError):
-        click.echo(click.style(shown, **style) if style else shown, err=err)
+        click.echo(click.style(shown, **style) if color and style else shown, err=err, color=color)
 
 
 def echo_summary(summary: Summary) -> None:
-    """Print a summary without its notes; lines are wrapped to the width of a terminal."""
+    """Print a summary without its notes; lines are wrapped to the width of a terminal.
+
+    A command that writes a result file does not call it if the user wants quiet.
+    """
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     for line in summary_lines(summary, width):
         echo(printable(line.text), **STYLES.get(line.part, {}))
@@ -89,6 +98,12 @@ def note(*texts: object) -> None:
     """Print notes on standard error."""
     for text in texts:
         echo(f"fecm: note: {with_options(str(text))}", err=True)
+
+
+def inform(*texts: object) -> None:
+    """Print notes that are no warnings, such as the name of a file that was written."""
+    if not terminal.is_quiet:
+        note(*texts)
 
 
 def with_options(text: str) -> str:
@@ -163,7 +178,7 @@ def progress(
     The bar ends with a remark. A single step without a remark has no bar. If standard error is not
     a terminal, a line a minute replaces the bar.
     """
-    if length < 2 and remark is None:
+    if terminal.is_quiet or (length < 2 and remark is None):
         yield lambda steps: None
         return
     if not sys.stderr.isatty():
@@ -192,7 +207,7 @@ def every_minute(line: Callable[[int], str]) -> Iterator[None]:
 
     `line` takes the number of minutes.  A thread prints, because the block may be a single call.
     """
-    if sys.stderr.isatty():
+    if sys.stderr.isatty() or terminal.is_quiet:
         yield
         return
     ended = threading.Event()

@@ -16,6 +16,7 @@ from fecm.cli.common import (
     echo_json,
     echo_summary,
     every_minute,
+    inform,
     note,
 )
 from fecm.cli.decks import load_single
@@ -115,13 +116,13 @@ def identify_command(
     targets.draw("histories:force_fit_picture", fit, unit_names(problem.deck))
     if output is not None:
         write_lines([fit.deck.to_text()], output, overwrite=overwrite)
-        note(f"wrote {output}")
+        inform(f"wrote {output}")
     if page is not None:
         # 0.5 s with matplotlib, which other fits do not need.
         from fecm.report.report import write_report
 
         write_report({job.measurement.name: fit}, page, overwrite=overwrite)
-        note(f"wrote {page}")
+        inform(f"wrote {page}")
     if form is Format.JSON:
         echo_json(fit.to_dict())
     else:

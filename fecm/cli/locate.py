@@ -8,7 +8,7 @@ from typing import Any
 import click
 from click import option
 
-from fecm.cli.common import DASH, FAILED, echo_json, echo_summary, every_minute, note
+from fecm.cli.common import DASH, FAILED, echo_json, echo_summary, every_minute, inform, note
 from fecm.cli.decks import load_single
 from fecm.cli.interrupts import signals
 from fecm.cli.options import (
@@ -84,7 +84,7 @@ def locate_command(
     if output is not None:
         with signals.deferred():
             location.save(output, overwrite=overwrite)
-        note(f"wrote {output}")
+        inform(f"wrote {output}")
     if form is Format.JSON:
         echo_json(location.to_dict())
     else:

@@ -19,7 +19,7 @@ from fecm.authoring.new_deck import author
 from fecm.authoring.parameters import ObjectError
 from fecm.authoring.plate import CUSTOM, FIXTURES, Plate, Support
 from fecm.cli import new_values
-from fecm.cli.common import DASH, RefusedError, echo, echo_path, note, write_text
+from fecm.cli.common import DASH, RefusedError, echo, echo_path, inform, note, write_text
 from fecm.cli.isolation import reads
 from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options, unique
 from fecm.cli.options import (
@@ -272,17 +272,20 @@ def new_command(
         authored = author(ImpactOptions(built, plies, units=laminate.units, **options))
     except (ObjectError, ImportError) as error:
         raise click.UsageError(as_options(str(error), context.params)) from None
-    notes = [as_options(text, context.params) for text in (*authored.doubts, *authored.notes)]
-    notes += _additions(authored.deck)
+    doubts, notes = (
+        [as_options(text, context.params) for text in texts]
+        for texts in (authored.doubts, authored.notes)
+    )
     command = _command_comment(context.meta[ARGUMENTS], output)
     text = command + authored.comments + format_deck(authored.deck.to_text())
     prepared = load_deck(text)
     if errors := prepared.errors():
-        note(*(as_options(text, context.params) for text in authored.doubts))
+        note(*doubts)
         for finding in errors:
             echo(finding.render("the new deck"), err=True)
         raise RefusedError("these options do not give a valid deck; nothing was written")
-    note(*notes)
+    note(*doubts)
+    inform(*notes, *_additions(authored.deck))
     for finding in prepared.findings:
         echo(finding.render(str(output) if to_file else "the new deck"), err=True)
     write_text(output, text, overwrite=overwrite)

@@ -19,6 +19,7 @@ from fecm._errors import did_you_mean
 from fecm._inputs import InputError, parsed_file
 from fecm._options import Option, declared_options
 from fecm.cli.common import DASH
+from fecm.cli.terminal import OUTPUT_OPTIONS
 from fecm.deck.units import NAMES, system_named
 from fecm.listing.slips import MODES, REPORT
 
@@ -377,9 +378,11 @@ class GroupedCommand(click.Command):
         options = [param for param in self.get_params(ctx) if isinstance(param, click.Option)]
         shown = {option.name: option.get_help_record(ctx) for option in options}
         sections = {
-            title: [shown.pop(name) for name in names] for title, names in self._groups.items()
+            title: [shown.pop(name) for name in names]
+            for title, names in {**self._groups, "Terminal": OUTPUT_OPTIONS}.items()
         }
-        sections.setdefault("Other options", []).extend(shown.values())
+        others = [*sections.pop("Other options", ()), *shown.values()]
+        sections["Other options"] = others  # the last section
         for title, records in sections.items():
             with formatter.section(title):
                 formatter.write_dl([record for record in records if record is not None])

@@ -13,7 +13,7 @@ import click
 
 from fecm._files import check_outputs, open_for_writing
 from fecm._text import DECIMALS, Decimal, csv_lines
-from fecm.cli.common import DASH, RefusedError, note
+from fecm.cli.common import DASH, RefusedError, inform
 from fecm.cli.options import FILE_PATH, NAMED_PATH, Decorated, stack_options
 from fecm.deck.units import column_name, unit_of
 from fecm.plot.kinds import SUFFIXES
@@ -95,7 +95,7 @@ class OutputPaths:
         """
         if self.picture is not None:
             save_picture(imported(place)(*data), self.picture, overwrite=self._overwrite)
-            note(f"drew {self.picture}")
+            inform(f"drew {self.picture}")
 
     def write(
         self, columns: Mapping[str, str], units: dict[str, str], rows: Iterable[Iterable[object]]
@@ -111,7 +111,7 @@ class OutputPaths:
         lines = csv_lines(chain([header], rows), self._decimal)
         write_lines(lines, self.table, overwrite=self._overwrite)
         if self.table != DASH:
-            note(f"wrote {self.table}")
+            inform(f"wrote {self.table}")
 
 
 def write_lines(lines: Iterable[str], path: Path, *, overwrite: bool) -> None:

@@ -32,6 +32,7 @@ from fecm.cli.options import (
     job_options,
     typical,
 )
+from fecm.cli.terminal import terminal
 from fecm.mechanics.failure import CriterionError
 from fecm.mechanics.own_law import LawError
 from fecm.mechanics.plate_motion import DivergenceError
@@ -107,7 +108,7 @@ def run_command(
         raise RefusedError(f"--fail-limit needs the macro FAIL; {deck} has none")
     exceeded: list[str] = []
     for number, job in enumerate(jobs):
-        if number and form is Format.TEXT:
+        if number and form is Format.TEXT and not terminal.is_quiet:
             echo()
         exposures = _run_and_print(job, form)
         if fail_limit is not None:
@@ -133,7 +134,7 @@ def _run_and_print(job: ProblemRun, form: Format) -> list[tuple[str, float]]:
     if not job.complete and form is Format.JSON:
         named = {"title": title, "result": str(path), "printed": job.printed}
         echo_json({**named, "units": result.units, **about})
-    elif not job.complete:
+    elif not (job.complete or terminal.is_quiet):
         files = {"result": job.path, "printed": job.printed}
         paths = [(label, str(path)) for label, path in files.items() if path is not None]
         echo_summary(summary.with_rows(RUN, *larger_steps(job.problem), *paths))

@@ -16,9 +16,11 @@ from fecm.cli.common import (
     FAILED,
     TerminalWatch,
     echo,
+    echo_json,
     echo_path,
     echo_summary,
     every_minute,
+    inform,
     note,
     watching,
 )
@@ -26,7 +28,9 @@ from fecm.cli.decks import refusing_errors
 from fecm.cli.interrupts import signals
 from fecm.cli.options import (
     DECK_PATH,
+    FORMAT_OPTION,
     NAMED_PATH,
+    Format,
     GroupedCommand,
     OneOf,
     Parsed,
@@ -35,8 +39,11 @@ from fecm.cli.options import (
     list_of,
     typical,
 )
+from fecm.cli.terminal import terminal
 from fecm.mechanics.own_law import LawError
+from fecm.results.summary import RUN
 from fecm.simulation.job import ProblemRun
+from fecm.sweeps.about import about_sweep
 from fecm.sweeps.distributions import FORMS
 from fecm.sweeps.execute import address_in
 from fecm.sweeps.job import Sweep
@@ -55,7 +62,7 @@ GROUPS: dict[str, list[str]] = {
     "Cases": [],
     "Random values": [],
     "Search": ["find"],
-    "Result": [],
+    "Result": ["form"],
     "Computation": ["scheduler_file"],
 }
 
@@ -117,12 +124,14 @@ def _texts(form: str, values: Iterable[str] = (), forms: Sequence[str] = ()) -> 
     is_flag=True,
     help="Exit with 0 even if cases failed, or probabilities are open.",
 )
+@FORMAT_OPTION
 def sweep_command(
     deck: Path,
     options: dict[str, Any],
     find: str | None,
     scheduler_file: Path | None,
     allow_failed: bool,
+    form: Format,
 ) -> None:
     """Run DECK many times with varied parameters.
 
@@ -141,13 +150,18 @@ def sweep_command(
     options["output"] = options["output"] or Path(f"{deck.stem}-sweep.h5")
     with refusing_errors("; nothing was run"):
         job = Sweep(deck, **options)
-    note(*job.doubts, *job.expectation())
+    note(*job.doubts)
+    inform(*job.expectation())
     result, watch = _computed(job)
-    echo_summary(summary_of_sweep(result).with_rows("Run", ("result", str(job.path))))
+    shows = form is Format.TEXT and not terminal.is_quiet
+    if shows:
+        echo_summary(summary_of_sweep(result).with_rows(RUN, ("result", str(job.path))))
     for case, run in job.full_runs().items():
-        _run_in_full(case, run)
-    echo()
-    echo(sweep_verdict(result))
+        _run_in_full(case, run, shows=shows)
+    if shows:
+        echo(f"\n{sweep_verdict(result)}")
+    elif form is Format.JSON:
+        echo_json(about_sweep(result, job.path))
     watch.close()
     if result.random is not None:
         note(*result.random.notes)
@@ -183,7 +197,7 @@ class _EndingWatch(TerminalWatch):
         return False
 
 
-def _run_in_full(case: int, run: ProblemRun) -> None:
+def _run_in_full(case: int, run: ProblemRun, *, shows: bool) -> None:
     """Run a case with all rows that its deck stores."""
     watch = _EndingWatch(lambda steps: None)
     try:
@@ -199,5 +213,6 @@ def _run_in_full(case: int, run: ProblemRun) -> None:
     except (KeyboardInterrupt, SystemExit):
         note(f"case {case} was not run in full: a signal stopped the program")
         raise
-    echo_path(run.path, f"  case {case:<12} ")
+    if shows:
+        echo_path(run.path, f"  case {case:<12} ")
     note(*(f"case {case}: {text}" for text in notes))
