@@ -17,13 +17,15 @@ import pytest
 import fecm
 from fecm.report.content import render
 from fecm.report.report import page_of
+from fecm.results.written import PageOptions
 from tests.browser import Browser, find_browser
 from tests.calls import call
 from tests.decks import LONG, small
 from tests.pages import read_page
+from tests.panels import TIME, scatter, struck
 from tests.test_first_failure import failing
 
-KINDS = ("run", "d7136", "runs", "sweep", "random", "fit")
+KINDS = ("run", "d7136", "measured", "runs", "sweep", "tests", "random", "location", "fit")
 LARGEST = 1_500_000  # bytes of a page
 AA = 4.5  # contrast of text, WCAG 2.2, success criterion 1.4.3
 A4 = (595.0, 842.0)  # points
@@ -88,14 +90,28 @@ def random_sweep() -> fecm.SweepResult:
     return fecm.sweep(LONG, random=laws, samples=16, exceed={"peak_force": 85.0})
 
 
+def located() -> fecm.Location:
+    """An impact on a small panel, located near its place."""
+    deck, strains, *_ = struck()
+    noisy, _ = scatter(strains, 0.02, seed=1)
+    return fecm.locate(deck, (TIME, noisy), region=(40.0, 30.0, 80.0, 65.0), grid=20.0, basis=9e-6)
+
+
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A page of every kind, as files."""
     folder = tmp_path_factory.mktemp("pages")
     run = fecm.run_one(failing(steps=160).replace("EXPE", "DELA\n       .02\nEXPE", 1))
     run.attributes["title"] = LONG_TITLE
+    measured = fecm.examples.path("measured-force.csv")
+    replay = fecm.run_one(fecm.examples.path("impact-patch.inp"))
+    html = render(page_of({"replay": replay}, options=PageOptions(measured=measured)))
+    (folder / "measured.html").write_text(html, encoding="utf-8", newline="\n")
+    drop_weight, tests = (fecm.examples.path(name) for name in ("drop-weight.inp", "tests.csv"))
     results = {
         "run": {"run": run},
+        "tests": {"tests": fecm.sweep(drop_weight, cases=tests)},
+        "location": {"located": located()},
         "d7136": {"drop-weight": fecm.run_one(fecm.examples.path("drop-weight.inp"))},
         "runs": {"one": run, "other": fecm.run_one(small())},
         "sweep": {"map": fecm.sweep(LONG, {"velocity": [50.0, 80.0, 400.0], "k": [1e6, 2e6]})},

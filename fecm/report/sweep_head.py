@@ -33,6 +33,7 @@ from fecm.sweeps.summary import (
 ENERGY = "force*length"
 OF_PROJECTILE = ("rod_length", "rod_modulus", "rod_density")  # which change its mass
 DIGITS = 4
+FEW_DIGITS = 3  # of headline figures
 
 
 def answers(sweep: SweepResult) -> Iterator[Answer]:
@@ -223,13 +224,13 @@ def headlines(sweep: SweepResult) -> list[Headline]:
     elif (energies := impact_energies(sweep)) is not None:
         unit = unit_of(ENERGY, sweep.units)
         ends = (float(energies.min()), float(energies.max()))
-        figures.append(Headline("impact energy", _together(ends, "to", unit)))
+        figures.append(Headline("impact energy", _together(ends, "to", unit, FEW_DIGITS)))
     figures.append(_figure(sweep, "peak_force", "peak force"))
     if THRESHOLD_FORCE in sweep.summary:
         figures.append(_figure(sweep, THRESHOLD_FORCE, "delamination threshold"))
     figures.append(_figure(sweep, "contact_time", "contact"))
     if RATIO in sweep.summary and np.isfinite(sweep[RATIO]).any():
-        figures.append(Headline("deflection", f"{_range(sweep, RATIO)} h"))
+        figures.append(Headline("deflection", f"{_range(sweep, RATIO, FEW_DIGITS)} h"))
     valid = int((sweep.validity == VALID).sum())
     random = sweep.random
     name, count = ("cases", len(sweep)) if random is None else ("draws", random.design.draws)
@@ -237,25 +238,27 @@ def headlines(sweep: SweepResult) -> list[Headline]:
     return figures
 
 
-def _range(sweep: SweepResult, name: str) -> str:
+def _range(sweep: SweepResult, name: str, digits: int = DIGITS) -> str:
     """Format the range of a result over the cases, or mean and standard deviation of draws."""
     unit, random = sweep.unit(name), sweep.random
     if random is not None and not random.combinations:
         moments = random.statistics[name]
         mean, deviation = float(moments.mean), float(moments.standard_deviation)
-        return "open" if math.isnan(mean) else _together((mean, deviation), "±", unit)
+        return "open" if math.isnan(mean) else _together((mean, deviation), "±", unit, digits)
     values = sweep[name][sweep.completed]
     values = values[np.isfinite(values)]
-    return _together((values.min(), values.max()), "to", unit) if len(values) else "open"
+    if not len(values):
+        return "open"
+    return _together((values.min(), values.max()), "to", unit, digits)
 
 
-def _together(ends: tuple[float, float], word: str, unit: str) -> str:
+def _together(ends: tuple[float, float], word: str, unit: str, digits: int) -> str:
     """Format two values with a word between them; one if both are equal or the second is small.
 
-    >>> _together((0.0036, 0.0037), "to", "s"), _together((360.0, 16000.0), "to", "N*mm")
+    >>> _together((0.0036, 0.0037), "to", "s", 2), _together((360.0, 16000.0), "to", "N*mm", 2)
     ('3.6 to 3.7 ms', '360 mJ to 16 J')
     """
-    first, second = (prefixed(float(end), unit, DIGITS) for end in ends)
+    first, second = (prefixed(float(end), unit, digits) for end in ends)
     if first == second or not abs(ends[1]) > ROUNDING * abs(ends[0]):
         return first
     (number, *name), (_, *other_name) = first.split(" ", 1), second.split(" ", 1)
@@ -264,7 +267,7 @@ def _together(ends: tuple[float, float], word: str, unit: str) -> str:
 
 def _figure(sweep: SweepResult, name: str, label: str) -> Headline:
     """Return the range of a result over the cases, or mean and standard deviation of draws."""
-    value: Cell = _range(sweep, name)
+    value: Cell = _range(sweep, name, FEW_DIGITS)
     is_mean = sweep.random is not None and not sweep.random.combinations and "±" in value
     known = int(np.isfinite(sweep[name][sweep.completed]).sum())
     remarks = ["mean ± standard deviation"] if is_mean else []
