@@ -11,7 +11,7 @@ import inspect
 import re
 import textwrap
 from collections.abc import Callable, Sequence
-from dataclasses import field, fields
+from dataclasses import MISSING, field, fields
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -31,6 +31,7 @@ class Option(NamedTuple):
 
     help: str  # for Python and for the help page of the command
     python: str  # what only Python offers
+    form: str  # of the value in Python, where the help has the form of the command line
     default_text: str  # the default in words, if it is not the default of the field
     group: str  # heading on that page; empty if only Python has the option
     choices: Sequence[str]
@@ -44,6 +45,7 @@ def option(
     help: str,
     *,
     python: str = "",
+    form: str = "",
     default_text: str = "",
     group: str = "",
     choices: Sequence[str] = (),
@@ -52,7 +54,7 @@ def option(
     least: float | None = None,
 ) -> Any:
     """Return the field of an option; see :class:`Option`."""
-    about = Option(help, python, default_text, group, choices, metavar, flag, least)
+    about = Option(help, python, form, default_text, group, choices, metavar, flag, least)
     return field(default=default, metadata={"option": about})
 
 
@@ -75,11 +77,14 @@ def documented(job: type[T]) -> type[T]:
 def _parameters(job: Any) -> str:
     lines = []
     types = {field.name: field.type for field in fields(job)}
-    for name, (about, _) in declared_options(job).items():
+    for name, (about, value) in declared_options(job).items():
         default = f"By default {about.default_text}." if about.default_text else ""
-        words = f"{about.help} {default} {about.python}".split()
+        words = f"{about.form} {about.help} {default} {about.python}".split()
         text = textwrap.fill(" ".join(words), WIDTH - 8)
-        lines += [f"{name} : {types[name]}", textwrap.indent(text, "    ")]
+        of_type = ", optional" if value is None else f", default {value!r}"
+        if value is MISSING:
+            of_type = ""
+        lines += [f"{name} : {types[name]}{of_type}", textwrap.indent(text, "    ")]
     return textwrap.indent("\n".join(lines), "    ").strip()
 
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from fecm._errors import warn
 from fecm._inputs import lines_of, parsed_file, parsed_toml
+from fecm._table import Table, html_table
 from fecm.deck.model import Allowables, Deck, Delamination, Expansion, Indentation, Ply
 from fecm.deck.units import (
     COEFFICIENT,
@@ -363,7 +364,19 @@ def material_names(deck: Deck) -> dict[int, str]:
     return {n: f"material {n}" if ply is None else ply.name for n, ply in named.items()}
 
 
-def materials(file: str | Path | None = None) -> dict[str, NamedPly]:
+class NamedPlies(dict[str, NamedPly]):
+    """Named plies, which notebooks show as a table."""
+
+    def _repr_html_(self) -> str:
+        columns = ("E1", "E2", "nu12", "G12", "density", "thickness")
+        rows = tuple(
+            (name, *(f"{ply.values.get(key, math.nan):g}" for key in columns), ply.system)
+            for name, ply in self.items()
+        )
+        return html_table(Table(rows, ("ply", *columns, "units"), "Plies"))
+
+
+def materials(file: str | Path | None = None) -> NamedPlies:
     """Return the named plies with their sources, as `fecm materials` lists them.
 
     Parameters
@@ -374,7 +387,7 @@ def materials(file: str | Path | None = None) -> dict[str, NamedPly]:
     Returns
     -------
     dict of str to NamedPly
-        Plies by their names.
+        Plies by their names; notebooks show them as a table.
 
     Raises
     ------
@@ -391,7 +404,7 @@ def materials(file: str | Path | None = None) -> dict[str, NamedPly]:
     >>> ply.converted("mm-ms-kg").e1  # GPa
     171.42
     """
-    return dict(MATERIALS) if file is None else parsed_file(Path(file), read_plies)
+    return NamedPlies(MATERIALS if file is None else parsed_file(Path(file), read_plies))
 
 
 SYSTEM = "in-lbf-s"  # system of units of the report

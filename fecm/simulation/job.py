@@ -73,6 +73,9 @@ class Price(NamedTuple):
     seconds: float
     at_most: bool = False
 
+    def __repr__(self) -> str:
+        return f"<fecm price: {self}>"
+
     def __str__(self) -> str:
         parts = [f"at most {self.steps} steps" if self.at_most else f"{self.steps} steps"]
         if self.output_bytes:

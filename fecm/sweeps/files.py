@@ -27,6 +27,7 @@ from fecm.sweeps.statistics import (
     Columns,
     Exceedance,
     Indices,
+    QuantityStatistics,
     RandomResult,
     Statistics,
     exceedances,
@@ -97,7 +98,7 @@ def random_of(
         asked = names if design.sensitivity else []
         return RandomResult(
             design,
-            {name: _statistics(contents, name, first) for name in names},
+            QuantityStatistics((name, _statistics(contents, name, first)) for name in names),
             {name: _indices(contents, name, first, len(design.laws)) for name in asked},
             _exceedance(contents, names, first),
             combinations,

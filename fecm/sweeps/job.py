@@ -131,7 +131,8 @@ class Sweep:
         None,
         "Values by name, FROM:TO:N or A,B,C, also with a unit, as in energy=5J:30J:6; all "
         f"combinations are run.  Names: {', '.join(NAMES)}.",
-        python="Or a mapping of names to values, or to such texts.",
+        form='Mapping of names to values, as in ``{"velocity": [50.0, 115.0]}``, or to texts; or '
+        'texts, as in ``"velocity=50,115"``.',
         group="Cases",
     )
     cases: Iterable[Mapping[str, Any]] | CaseTable | Path | None = option(
@@ -153,8 +154,9 @@ class Sweep:
         None,
         f"Random value by its law: {', '.join(FORMS[:-1])} or {FORMS[-1]}.  With vary all "
         "combinations get the same draws.",
-        python="A law is a text, or an object whose method ppf or icdf gives its quantiles, such "
-        "as a distribution of scipy.stats with its parameters.",
+        form='Mapping of names to laws, as in ``{"k": "lognormal:1.9e6,.15"}``; a law is a text or '
+        "an object whose method ppf or icdf gives its quantiles, such as a distribution of "
+        "scipy.stats with its parameters.",
         group="Random values",
     )
     correlation: Mapping[Pair, float] | ArrayLike | CaseTable | Named | None = option(
@@ -182,7 +184,7 @@ class Sweep:
         None,
         "Probability that a quantity of the summary exceeds a value; of peak_force also "
         "threshold, DELA's.",
-        python="Or a mapping of quantities to values.",
+        form='Mapping of quantities to values, as in ``{"peak_force": 5000.0}``, or texts.',
         group="Random values",
     )
     until: float | Literal["threshold"] | Mapping[str, float | str] | None = option(
@@ -190,7 +192,7 @@ class Sweep:
         "Search in every case for the velocity at which a quantity is reached: peak_force=NUMBER, "
         "peak_force=threshold (DELA's), or exposure=NUMBER, the largest of FAIL outside the "
         "load, by full runs.",
-        python="A number or 'threshold' for the peak force, or a mapping of one name.",
+        form='A peak force, ``"threshold"``, or a mapping, as in ``{"exposure": 1.0}``.',
         group="Search",
     )
     history: bool = option(False, "Also store the contact force of every step.", group="Result")

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._arrays import compared_by_identity
+from fecm._table import Row, Table, html_table
+from fecm._text import significant
 from fecm._typing import Bools, Floats
 from fecm.judge.end import MAY_TOUCH, PEAK_NOT_REACHED
 from fecm.results.metrics import THRESHOLD_FORCE, VALIDITY, VERDICTS
@@ -62,6 +64,21 @@ class Indices(NamedTuple):
     total: Floats
     first_interval: Floats
     total_interval: Floats
+
+
+class QuantityStatistics(dict[str, Statistics]):
+    """Statistics by quantity, which notebooks show as a table."""
+
+    def _repr_html_(self) -> str:
+        labels = ("mean", "std. dev.", *(f"{q:.0%}".replace("%", " %") for q in QUANTILES))
+        rows: list[Row] = []
+        for name, moments in self.items():
+            if np.ndim(moments.mean) == 0:
+                values = (moments.mean, moments.standard_deviation, *moments.quantiles)
+                rows.append((name, *(significant(float(value)) for value in values)))
+            else:  # with varied values
+                rows.append((name, f"{len(moments.mean)} combinations", *[""] * len(labels[1:])))
+        return html_table(Table(tuple(rows), ("", *labels), "Statistics"))
 
 
 def statistics(values: Floats) -> Statistics:
@@ -214,7 +231,7 @@ class RandomResult:
     """
 
     design: Design
-    statistics: dict[str, Statistics]
+    statistics: QuantityStatistics
     sensitivity: dict[str, Indices]
     exceedance: Exceedance
     combinations: dict[str, Column] = field(default_factory=dict)
@@ -245,7 +262,7 @@ def evaluate(
     check_limits(limits, list(columns), threshold=THRESHOLD_FORCE in columns)
     return RandomResult(
         design=design,
-        statistics={name: statistics(values) for name, values in draws.items()},
+        statistics=QuantityStatistics((n, statistics(values)) for n, values in draws.items()),
         sensitivity=_sensitivity(design, columns) if design.sensitivity else {},
         exceedance=exceedances(draws, is_open[..., : design.draws], limits),
         combinations=combinations,
