@@ -173,10 +173,3 @@ def test_the_command_draws_the_file_as_the_method_draws_the_location(tmp_path: P
     assert (done.exit_code, done.stdout, done.stderr) == (0, "located-location.png\n", "")
     drawn = tmp_path / "located-location.png"
     assert drawn.read_bytes() == (tmp_path / "own.png").read_bytes()
-
-
-def test_a_located_impact_has_no_report_and_that_is_said(tmp_path: Path) -> None:
-    located().save(tmp_path / "located.h5")
-    refused = call("report", "located.h5", cwd=tmp_path)
-    assert refused.exit_code == 2
-    assert refused.stderr.endswith("not of a run or a sweep\n")
