@@ -166,6 +166,12 @@ OWN: dict[str, Callable[[Any, Names], None]] = {
 }
 
 
+def tests(ax: Any, compared: Any) -> None:
+    """Draw computed over measured values, and the line of equal values."""
+    ax.plot(compared.measured, compared.computed, "o", ms=3 * STROKE)
+    ax.axline((0.0, 0.0), slope=1.0, color=COLOURS[1], lw=STROKE / 2)
+
+
 def fitted(ax: Any, fit: Any) -> None:
     """Draw a fitted force through the measured points."""
     ax.plot(fit.time, fit.force, "o", color=COLOURS[0], ms=STROKE)
@@ -186,6 +192,10 @@ def of_page(result: Any, path: Path) -> None:
             _save(path, lambda ax: impact(ax, result))
         case fecm.Identification():
             _save(path, lambda ax: fitted(ax, result))
+        case fecm.Location():
+            _save(path, lambda ax: place(ax, {"location": result}))
+        case fecm.SweepResult(random=None) if result.measured:
+            _save(path, lambda ax: tests(ax, result.compare()))
         case fecm.SweepResult(random=None):
             _save(path, lambda ax: map_of(ax, {"result": result}))
         case _:
