@@ -98,14 +98,15 @@ def described_by(job: Any) -> Callable[[T], T]:
         section = SECTION.search(job.__doc__)
         assert section is not None
         if place[0] == PLACE:
-            return section[1]
+            return textwrap.dedent(f"    {section[1].strip()}")
         entry = re.search(ENTRY.format(place[1]), section[1], re.M)
         assert entry is not None, place[1]
-        return entry[0].strip()
+        return textwrap.dedent(f"    {entry[0].strip()}")
 
     def decorate(function: T) -> T:
         if function.__doc__ and job.__doc__:  # Python without docstrings has none
-            function.__doc__ = re.sub(r"\{(\w+)\}", text_of, function.__doc__)
+            unindented = inspect.cleandoc(function.__doc__)  # whatever class the function is in
+            function.__doc__ = re.sub(r"\{(\w+)\}", text_of, unindented)
         return function
 
     return decorate

@@ -275,13 +275,13 @@ def test_the_command_has_the_options_of_the_job_with_their_help(command: str, jo
 def test_a_function_says_of_its_parameters_what_its_job_says(
     function: Callable[..., object], job: type
 ) -> None:
-    texts = str(job.__doc__)
+    texts = str(inspect.getdoc(job))
     shared = inspect.signature(function).parameters.keys() & inspect.signature(job).parameters
     assert len(shared) >= 4
     for name in shared:
-        entry = re.search(rf"^    [\w, ]*\b{name}\b.* : .*\n(?: {{8}}.*\n)+", texts, re.M)
+        entry = re.search(rf"^[\w, ]*\b{name}\b.* : .*\n(?: {{4}}.*\n)+", texts, re.M)
         assert entry is not None, name
-        assert entry[0] in str(function.__doc__)
+        assert entry[0] in str(inspect.getdoc(function))
 
 
 def test_the_page_has_the_table_of_what_excludes_what() -> None:
