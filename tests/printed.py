@@ -38,8 +38,9 @@ MASKED = re.compile(
     r"|fecm \d[\w.+]*|about \d+ s\b|(?:/[\w.-]+){2,}"
 )
 GAP = "..."
-# Commands of a checkout, which .ci/run executes.
+# Lines that install the package in a clone; .ci/run executes them.
 SET_UP = "python3 -m venv"
+ROOT = Path(__file__).parents[1]
 
 
 class Printed(NamedTuple):
@@ -52,17 +53,19 @@ class Printed(NamedTuple):
 def outputs(page: Path, folder: Path) -> Iterator[Printed]:
     """Run the blocks of a page in a folder, and yield the outputs that it shows.
 
-    The commands of a block ``sh`` must succeed.  In Python a warning is an error, except for the
-    notes about a result.
+    The commands of a block ``sh`` must succeed; those that install are left out.  In Python a
+    warning is an error, except for the notes about a result.  The folder gets the decks of the clone.
     """
+    (folder / "decks").symlink_to(ROOT / "decks")
     names: dict[str, object] = {"__name__": page.stem}
     last: list[str] = []
     for match in BLOCK.finditer(page.read_text(encoding="utf-8")):
         language, text = match[2], textwrap.dedent(match[3] or "")
         if language == "python":
             last = lines_of(run_python(text, folder, names))
-        elif language == "sh" and not text.startswith(SET_UP):
-            last = lines_of(run_shell(text, folder))
+        elif language == "sh":
+            commands = [line for line in text.splitlines() if not line.startswith(SET_UP)]
+            last = lines_of(run_shell("\n".join(commands), folder)) if commands else []
         elif language == "text" and text.startswith("$ "):
             yield Printed(match[3], transcript(text, folder))
         elif language == "text" and last:

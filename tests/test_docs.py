@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.decks import ROOT
+from tests.pages import read_page
 from tests.printed import differences, outputs
 
 PAGES = ["README.md"] + [
@@ -25,8 +26,17 @@ def _close_figures() -> object:
     plt.close("all")
 
 
-def test_the_commands_and_snippets_of_the_readme_run(tmp_path: Path) -> None:
-    assert len(list(outputs(ROOT / "README.md", tmp_path))) == 1
+def test_the_readme_shows_what_its_commands_print_and_the_figures_of_its_page(
+    tmp_path: Path,
+) -> None:
+    readme = ROOT / "README.md"
+    blocks = [differences(shown, output) for shown, output in outputs(readme, tmp_path)]
+    assert len(blocks) > 2 and not any(blocks)
+    page = read_page((tmp_path / "plate.html").read_text(encoding="utf-8"))
+    text = readme.read_text(encoding="utf-8")
+    figures = [[cell.text for cell in figure[:3]] for figure in page.terms]
+    assert len(figures) == 6
+    assert [row for row in figures if f"| {' | '.join(row)} |" not in text] == []
 
 
 @pytest.mark.long
