@@ -54,7 +54,8 @@ def outputs(page: Path, folder: Path) -> Iterator[Printed]:
     """Run the blocks of a page in a folder, and yield the outputs that it shows.
 
     The commands of a block ``sh`` must succeed; those that install are left out.  In Python a
-    warning is an error, except for the notes about a result.  The folder gets the decks of the clone.
+    warning is an error, except for the notes about a result.  The folder gets the decks of the
+    clone.
     """
     (folder / "decks").symlink_to(ROOT / "decks")
     names: dict[str, object] = {"__name__": page.stem}
