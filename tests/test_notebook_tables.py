@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import pickle
 
 import fecm
@@ -27,14 +28,14 @@ def test_a_price_shows_its_text() -> None:
 
 
 def test_parameters_of_a_sweep_say_their_python_form_first_and_their_default() -> None:
-    text = fecm.sweep.__doc__ or ""
+    text = inspect.getdoc(fecm.sweep) or ""
     for name, form in (
         ("vary", "Mapping of names to values"),
         ("random", "Mapping of names to laws"),
         ("exceed", "Mapping of quantities to values"),
         ("until", "A peak force"),
     ):
-        head, first = text.split(f"    {name} : ")[1].split("\n")[:2]
+        head, first = text.split(f"\n{name} : ")[1].split("\n")[:2]
         assert head.endswith(", optional")
         assert first.strip().startswith(form)
     assert "seed : int, default 0" in text

@@ -48,6 +48,7 @@ def test_the_energy_at_the_threshold_is_the_one_that_a_search_finds(energy: floa
 
 
 @pytest.mark.parametrize("factor", [0.25, 1.5])
+@pytest.mark.few(1)
 def test_a_plate_that_stretches_needs_the_energy_that_a_second_run_has(factor: float) -> None:
     first, second = (fecm.run_one(deck(e, "von-karman")) for e in (6000.0, 6000.0 * factor))
     scaled = energy_at_force(first, float(second.force.max()))

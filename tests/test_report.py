@@ -135,6 +135,7 @@ def test_a_reader_of_the_page_alone_learns_what_happened(failed: Result, shown: 
     assert all(note in text for note in failed.notes)
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_a_criterion_that_reaches_1_below_the_threshold_is_named_beside_it(failed: Result) -> None:
     tough = LIGHT.replace(".02", ".07")  # the threshold grows as the square root
     before = fecm.run_one(failing(steps=160).replace("EXPE", tough, 1))
@@ -344,6 +345,7 @@ def test_several_runs_stand_side_by_side(failed: Result) -> None:
     assert report_page.pictures
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_columns_and_regions_of_a_page_have_names_of_their_own(failed: Result) -> None:
     other = fecm.run_one(small())
     by_name = {"peak force": failed, "plate": other}  # names of rows too

@@ -82,6 +82,7 @@ def test_the_choice_of_a_call_does_not_last() -> None:
 
 
 @pytest.mark.parametrize("columns", [60, 80, 120])
+@pytest.mark.few(1)
 def test_lines_of_a_summary_are_not_longer_than_the_terminal_and_lose_no_word(columns: int) -> None:
     result = fecm.run_one(fecm.examples.path("drop-weight"))
     summary = summary_of_run(result)
