@@ -374,16 +374,15 @@ def test_a_support_of_an_unsymmetric_laminate_frees_the_plane_without_a_note(
 SHARING = (Changes.FAILURE, Changes.STRIKE)  # what cases of one plate differ in
 
 
-def test_the_table_of_the_page_on_sweeps_is_that_of_the_values() -> None:
+def test_the_page_of_names_has_the_table_of_the_values() -> None:
     signs = str.maketrans({"*": "·"})
     rows = [
         f"| `{name}` | {variable.dimension.translate(signs)} | {variable.meaning} | "
         f"{'one for all cases' if variable.changes in SHARING else 'one per value'} |"
         for name, variable in VARIABLES.items()
     ]
-    page = (Path(__file__).parent.parent / "docs" / "sweeps.md").read_text()
-    section = page.split("## What can be varied")[1].split("\n## ")[0]
-    assert [line for line in section.splitlines() if line.startswith("| `")] == rows
+    page = (Path(__file__).parent.parent / "docs" / "sweep-names.md").read_text()
+    assert [line for line in page.splitlines() if line.startswith("| `")] == rows
 
 
 def test_the_help_of_the_command_lists_every_name() -> None:

@@ -1,6 +1,6 @@
 """Values that can vary: the table of their names, their texts, and their application to a deck.
 
-The table determines the checks of names, the help of the command and docs/sweeps.md.
+The table determines the checks of names, the help of the command and docs/sweep-names.md.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class SweepValue(Generic[_Setter]):
     dimension: str  # dimension of its unit; empty for a pure number or a text
     setter: _Setter
     kind: ValueKind = ValueKind.NUMBER
-    meaning: str = ""  # Markdown of docs/sweeps.md
+    meaning: str = ""  # Markdown of docs/sweep-names.md
 
 
 _MASS = "force*time^2/length"
