@@ -36,9 +36,13 @@ from fecm.deck.model import (
     Nonlinear,
     NumberedLaminate,
     NumberedPly,
+    OneSidedSupport,
+    OneSidedSupports,
     Page,
+    PointMasses,
     Preload,
     PrintOption,
+    Springs,
     Units,
     Zone,
     Zones,
@@ -74,6 +78,22 @@ def decks(draw: st.DrawFn) -> Deck:
                 ),
                 st.lists(st.builds(NodeValues, nodes, counts, five), max_size=4).map(
                     lambda records: Forces(tuple(records))
+                ),
+                st.builds(
+                    lambda records, word: Springs(tuple(records), word=word),
+                    st.lists(st.builds(NodeValues, nodes, counts, five), max_size=4),
+                    st.sampled_from(["", "LINE"]),
+                ),
+                st.builds(
+                    lambda records, word: OneSidedSupports(tuple(records), word=word),
+                    st.lists(
+                        st.builds(OneSidedSupport, nodes, counts, counts, numbers, numbers),
+                        max_size=4,
+                    ),
+                    st.sampled_from(["", "LINE"]),
+                ),
+                st.lists(st.builds(NodeValues, nodes, counts, st.tuples(numbers, numbers))).map(
+                    lambda records: PointMasses(tuple(records))
                 ),
                 st.lists(
                     st.builds(NodeCodes, nodes, counts, st.tuples(*[counts] * 5)), max_size=4

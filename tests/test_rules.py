@@ -52,6 +52,15 @@ def mesh(old: str, new: str) -> Deck:
     return lambda: small(mesh=MESH.replace(old, new))
 
 
+def on_rollers(cards: str) -> Deck:
+    """The small plate without restraints of w, on one-sided supports."""
+    head = MESH[: MESH.index("BOUN")]
+    free = (
+        f"{head}BOUN\n    1    1   -1   -1    0    0    0\n   25    0    1    1    0    0    0\n\n"
+    )
+    return lambda: small(mesh=f"{free}UNIL\n{cards}\n")
+
+
 def supports(*cards: str) -> Deck:
     """The small plate with other BOUN cards."""
     head = MESH[: MESH.index("BOUN")]
@@ -337,6 +346,18 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "E456": plate(replaced("^      -0.5      0.35", "      -2.0      0.35")),
     "E457": plate(with_card("DELA", "-1.,")),
     "W458": lambda: decks.small(data="DELA\n.8,\n" + decks.DATA_CARDS),
+    "E570": more("SPRI LINES\n\n"),
+    "E571": more("MASS\n13,0,-1.,0.\n\n"),
+    "E572": more("UNIL\n13,0,2,0.,0.\n\n"),
+    "E573": more("SPRI LINE\n1,13,0.,0.,1.,0.,0.\n\n"),
+    "E574": lambda: supports("    1    0    1    1    1    0    0")().replace(
+        "ROD\n", "UNIL\n1,0,1,0.,0.\n\nROD\n"
+    ),
+    "W575": more("SPRI\n1,0,1.,0.,0.,0.,0.\n\n"),
+    "W576": on_rollers("3,0,1,0.,1.\n"),
+    "W577": lambda: on_rollers("3,0,1,1.E9,0.\n")().replace("DT        .5E-6", "DT        .5E-9"),
+    "W578": on_rollers("3,0,1,1.,0.\n11,2,1,1.,0.\n15,0,1,1.,0.\n23,0,1,1.,0.\n"),
+    "E579": on_rollers("3,0,1,0.,0.\n"),
     "E459": more("DAMP\n-1.,\n"),
     "W460": more("DAMP\n1.E6,\n"),
     "W556": on_window,

@@ -196,7 +196,14 @@ def _update_time_step(deck: Deck, changed: Deck, case: Case) -> Deck:
 # Parts --------------------------------------------------------------------------------------------
 
 # Segments of a mesh and its supports.
-OF_MESH: tuple[type[model.Segment], ...] = (model.Coordinates, model.Elements, model.Boundary)
+OF_MESH: tuple[type[model.Segment], ...] = (
+    model.Coordinates,
+    model.Elements,
+    model.Boundary,
+    model.Springs,
+    model.OneSidedSupports,
+    model.PointMasses,
+)
 
 
 def with_projectile(deck: model.Deck, projectile: AnyProjectile) -> model.Deck:
@@ -277,7 +284,7 @@ def with_plate(deck: model.Deck, plate: Plate, at: tuple[float, float] | None) -
     mesh, node, patch, point = place_impact(plate, plies_of_deck(deck), at, patch, doubts)
     stretches = deck.has(model.Nonlinear) or is_coupled(deck)
     membrane = MembraneSupport.of(curved=is_curved(deck), stretches=stretches)
-    boundary, _ = support_plate(plate, mesh, None, [], membrane)
+    supports, _ = support_plate(plate, mesh, None, [], membrane, system_of(deck))
     for doubt in doubts:
         warn(doubt)
     control = replace(
@@ -288,7 +295,6 @@ def with_plate(deck: model.Deck, plate: Plate, at: tuple[float, float] | None) -
         source=None,
     )
     kept = tuple(segment for segment in deck.segments if not isinstance(segment, OF_MESH))
-    supports = () if boundary is None else (boundary,)
     changed = replace(
         deck,
         control=control,

@@ -3,17 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from enum import Enum, auto
 from typing import Literal, NamedTuple, Self
 
 from fecm.authoring.laminate import DeckPlies
-from fecm.authoring.parameters import ObjectError, is_finite, lengths_in_units
-from fecm.authoring.plate import MOST, WINDOW_GRADING, WINDOW_MESH, Plate
+from fecm.authoring.parameters import (
+    ObjectError,
+    check_positive,
+    is_finite,
+    lengths_in_units,
+    parameter_in_units,
+)
+from fecm.authoring.plate import MOST, PUSH, WINDOW_GRADING, WINDOW_MESH, Fixture, Plate
 from fecm.deck import grid as grids
 from fecm.deck.grid import ElementGrid, GridSection, held_in_plane
-from fecm.deck.model import Boundary, Curvature, Patch
+from fecm.deck.model import (
+    Curvature,
+    NodeValues,
+    OneSidedSupport,
+    OneSidedSupports,
+    Patch,
+    Segment,
+    Springs,
+)
+from fecm.deck.support_cards import LINE
 from fecm.problem.plate_mesh import PlateMesh
 
 MOST_ELEMENTS = 500_000
@@ -139,9 +154,9 @@ def _sections(
 
 
 class Supported(NamedTuple):
-    """Supports of a plate, and comment lines about a window."""
+    """Segments of the supports of a plate, and comment lines about a window."""
 
-    boundary: Boundary | None
+    segments: tuple[Segment, ...]
     comment: str
 
 
@@ -180,8 +195,9 @@ def support_plate(
     in_plane: InPlane | None,
     notes: list[str],
     membrane: MembraneSupport,
+    system: str | None,
 ) -> Supported:
-    """Return the supports of a plate.
+    """Return the supports of a plate, in a system of units.
 
     If u and v are zero anyway, they are held at every node. `in_plane` then has no effect, and
     `notes` gets a text about it.
@@ -200,12 +216,40 @@ def support_plate(
     if membrane is MembraneSupport.CURVED:
         notes.append(_note_of_curved(plate, in_plane))
     if isinstance(mesh, PlateMesh):
-        return Supported(mesh.supported(everywhere, plate.supports, in_plane=in_plane), "")
-    window = plate.fixture.window if plate.fixture else None
-    boundary = mesh.supported(everywhere, plate.supports, window, in_plane=in_plane)
-    slides = window is not None and in_plane == FREE
-    comment = "! The plate slides on the window: u and v are free.\n" if slides else ""
-    return Supported(boundary, comment)
+        boundary = mesh.supported(everywhere, plate.supports, in_plane=in_plane)
+        return Supported(() if boundary is None else (boundary,), "")
+    if (fixture := plate.fixture) is None:
+        boundary = mesh.supported(everywhere, plate.supports, in_plane=in_plane)
+        return Supported(() if boundary is None else (boundary,), "")
+    comment = "! The plate slides on the window: u and v are free.\n" if in_plane == FREE else ""
+    segments = _on_fixture(fixture, mesh, everywhere, in_plane, system)
+    return Supported(tuple(segments), comment)
+
+
+def _on_fixture(
+    fixture: Fixture,
+    mesh: ElementGrid,
+    everywhere: Sequence[int],
+    in_plane: InPlane,
+    system: str | None,
+) -> Iterator[Segment]:
+    """Yield the segments of a window and its clamps."""
+    pushes = fixture.support == PUSH
+    tips = sorted({mesh.nearest(*place)[0] for place in fixture.tips})
+    held = tips if fixture.clamps == HELD else []
+    boundary = mesh.supported(
+        everywhere, {}, fixture.window, in_plane=in_plane, holds_w=not pushes, points=held
+    )
+    if boundary is not None:
+        yield boundary
+    if pushes:
+        lines = [OneSidedSupport(*ends) for ends in mesh.window_lines(fixture.window)]
+        yield OneSidedSupports(tuple(lines), word=LINE)
+    if tips and not held:
+        stiffness = parameter_in_units("clamps", fixture.clamps, "force/length", system)
+        check_positive(clamps=stiffness)
+        values = (0.0, 0.0, float(stiffness or 0.0), 0.0, 0.0)
+        yield Springs(tuple(NodeValues(node, 0, values) for node in tips))
 
 
 def _note_of_curved(plate: Plate, in_plane: InPlane) -> str:

@@ -423,12 +423,14 @@ def with_supports(
     membrane = MembraneSupport.of(
         curved=plain.has(model.Curvature), stretches=nonlinear or plies.is_coupled
     )
-    boundary, comment = support_plate(options.plate, mesh, options.in_plane, notes, membrane)
+    supports, comment = support_plate(
+        options.plate, mesh, options.in_plane, notes, membrane, plies.system
+    )
     segments: list[model.Segment] = []
     for segment in plain.segments:
         segments.append(segment)
-        if isinstance(segment, model.Elements) and boundary is not None:
-            segments.append(boundary)
+        if isinstance(segment, model.Elements):
+            segments += supports
     if nonlinear:  # before the preload and the laminate
         later = (model.Preload, model.Material)
         place = next(n for n, part in enumerate(segments) if isinstance(part, later))

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Literal, NamedTuple, Self
+from typing import Literal, NamedTuple, Self, get_args
 
 from numpy.typing import ArrayLike
 
@@ -43,6 +43,11 @@ class DropWeight(NamedTuple):
         return self.thinnest <= round(thickness, 9) <= self.thickest
 
 
+Window = Literal["held", "push"]  # support of w on the edges of a window
+HELD: Literal["held"] = "held"
+PUSH: Literal["push"] = "push"
+
+
 class Fixture(NamedTuple):
     """Fixture that supports a plate on the edges of a window in its middle."""
 
@@ -51,21 +56,42 @@ class Fixture(NamedTuple):
     size: tuple[float, float]
     window: tuple[float, float]
     test: DropWeight | None = None  # values of the standard; None for a custom fixture
+    clamp: tuple[float, float] | None = None  # tip of a clamp from the corner, length
+    support: Window = HELD
+    # Stiffness of a clamp, force/length, "held" for rigid clamps, or None without clamps.
+    clamps: float | str | None = None
+
+    @property
+    def tips(self) -> list[tuple[float, float]]:
+        """Places of the tips of the clamps."""
+        if self.clamp is None or self.clamps is None:
+            return []
+        (lx, ly), (x, y) = self.size, self.clamp
+        return [(x, y), (lx - x, y), (x, ly - y), (lx - x, ly - y)]
 
     @property
     def comment(self) -> str:
         """Comment lines for a deck."""
         (lx, ly), (wx, wy) = self.size, self.window
-        return (
-            f"! Fixture {self.name}: a plate of {lx:g} x {ly:g}, w = 0 along the edges of a "
-            f"window of {wx:g} x {wy:g}.\n"
-            "! Clamps and lift-off are not modelled.\n"
-        )
+        window = f"the edges of a window of {wx:g} x {wy:g}"
+        rests = f"w = 0 along {window}"
+        if self.support == PUSH:
+            rests = f"{window} push it (UNIL), and do not pull"
+        if self.clamps == HELD:
+            clamps = "w = 0 at the nodes nearest to the tips of the four clamps"
+        elif self.clamps is not None:
+            clamps = f"Springs (SPRI) of {self.clamps} at the nodes nearest to the four clamps"
+        else:
+            clamps = "Clamps are not modelled"
+            if self.support == HELD:
+                clamps = "Clamps and lift-off are not modelled"
+        return f"! Fixture {self.name}: a plate of {lx:g} x {ly:g}, {rests}.\n! {clamps}.\n"
 
 
 # ASTM D7136/D7136M: 5.5 kg, hemisphere of 16 mm diameter, 6.7 J per mm of thickness.
 D7136 = DropWeight(mass=5.5e-3, radius=8.0, energy=6700.0, thinnest=4.0, thickest=6.0)
-FIXTURES = {"D7136": Fixture("D7136", (150.0, 100.0), (125.0, 75.0), D7136)}
+# The standard prescribes where clamps press, but not exactly: some 19 and 6 mm from the corners.
+FIXTURES = {"D7136": Fixture("D7136", (150.0, 100.0), (125.0, 75.0), D7136, (19.0, 6.0))}
 
 
 def parse_fixture(text: str) -> Fixture:
@@ -91,7 +117,7 @@ MOST = 2000  # largest number of elements in one direction
 WINDOW_MESH = (20, 12)
 WINDOW_GRADING = 3.0
 
-Support = Literal["free", "simple", "pinned", "clamped"]
+Support = Literal["free", "soft", "simple", "pinned", "clamped"]
 
 
 @dataclass(frozen=True)
@@ -159,7 +185,8 @@ class Plate:
         mesh : tuple of int
             Numbers of elements along x and y.
         support : str
-            Support of all edges: ``"free"``, ``"simple"``, ``"pinned"`` or ``"clamped"``.
+            Support of all edges: ``"free"``, ``"soft"``, ``"simple"``, ``"pinned"`` or
+            ``"clamped"``.
         edges : dict, optional
             Support of single edges: ``"left"``, ``"right"``, ``"bottom"`` or ``"top"``.
         grading : float
@@ -220,7 +247,13 @@ class Plate:
 
     @classmethod
     def on_fixture(
-        cls, name: str, mesh: tuple[int, int] | None = None, *, grading: float | None = None
+        cls,
+        name: str,
+        mesh: tuple[int, int] | None = None,
+        *,
+        grading: float | None = None,
+        window: Window = HELD,
+        clamps: float | str | None = None,
     ) -> Self:
         """Return a plate that lies on the edges of a window.
 
@@ -236,6 +269,12 @@ class Plate:
         grading : float, optional
             Length of the largest element over the length of the smallest. The default is 3 with the
             default mesh, and 1 with another mesh.
+        window : str
+            ``"held"``: w is 0 on the edges of the window, which pull as well. ``"push"``: they only
+            push (UNIL). The real plate lies between both.
+        clamps : float or str, optional
+            Clamps of a standard that press the plate on the window: ``"held"`` for w = 0 at their
+            tips, or the stiffness of each, force/length, also with a unit, as in ``"2kN/mm"``.
 
         Raises
         ------
@@ -243,6 +282,13 @@ class Plate:
             If the name or a value is invalid.
         """
         fixture = parse_fixture(name)
+        if window not in get_args(Window):
+            raise ObjectError(f"`window` is {window!r}; it is {' or '.join(get_args(Window))}")
+        if clamps is not None and fixture.clamp is None:
+            raise ObjectError(
+                f"`clamps` are those of a standard, {', '.join(FIXTURES)}, which tells their places"
+            )
+        fixture = fixture._replace(support=window, clamps=clamps)
         ratio = grading or (WINDOW_GRADING if mesh is None else 1.0)
         plain = cls.rectangle(fixture.window, mesh or WINDOW_MESH, grading=ratio)
         return replace(plain, fixture=fixture)
@@ -268,10 +314,10 @@ class Plate:
             A file that meshio reads, such as Gmsh's `.msh`; a mesh of meshio or PyVista; or points
             (n, 2) and cells (m, k) with points counted from 0.
         support : dict or str, optional
-            Supports by the names of groups of lines: ``"free"``, ``"simple"``, ``"pinned"`` or
-            ``"clamped"``. The group ``"boundary"`` has all sides of the outline and of holes that
-            are in no other group named here. A single support applies to this group. A group that
-            is named like a support has that support.
+            Supports by the names of groups of lines: ``"free"``, ``"soft"``, ``"simple"``,
+            ``"pinned"`` or ``"clamped"``. The group ``"boundary"`` has all sides of the outline and
+            of holes that are in no other group named here. A single support applies to this group.
+            A group that is named like a support has that support.
         groups : dict, optional
             Points of groups; only for a mesh of arrays.
 

@@ -38,10 +38,13 @@ class EdgeCodes(NamedTuple):
         return self.along_y if edge in ("left", "right") else self.along_x
 
 
-# Codes of w, theta_x and theta_y. A simple support holds theta_x along x, and theta_y along y.
+# Codes of w, theta_x and theta_y. A simple support holds theta_x along x, and theta_y along y; a
+# soft one holds w alone.
 W_HELD = (1, 0, 0)
+W_FREE = (0, 0, 0)
 SUPPORTS = {
-    "free": EdgeCodes(along_x=(0, 0, 0), along_y=(0, 0, 0)),
+    "free": EdgeCodes(along_x=W_FREE, along_y=W_FREE),
+    "soft": EdgeCodes(along_x=W_HELD, along_y=W_HELD),
     "simple": EdgeCodes(along_x=(1, 1, 0), along_y=(1, 0, 1)),
     "pinned": EdgeCodes(along_x=(1, 1, 0), along_y=(1, 0, 1)),
     "clamped": EdgeCodes(along_x=(1, 1, 1), along_y=(1, 1, 1)),
@@ -251,18 +254,22 @@ class ElementGrid:
         window: tuple[float, float] | None = None,
         *,
         in_plane: str = "held",
+        holds_w: bool = True,
+        points: Sequence[int] = (),
     ) -> Boundary | None:
         """Return BOUN cards for the supports of the edges.
 
         `in_plane`, a key of :data:`IN_PLANE`, tells how the supports restrain u and v. See
-        :meth:`boundary` for `everywhere` and `window`.
+        :meth:`boundary` for the other parameters.
         """
         codes: dict[str, tuple[int, ...]] = {}
         for edge, support in supports.items():
             if support != "free":
                 held = IN_PLANE[held_in_plane(support, in_plane)]
                 codes[edge] = (*held.of(edge), *SUPPORTS[support].of(edge))
-        return self.boundary(everywhere, codes, window, in_plane=in_plane)
+        return self.boundary(
+            everywhere, codes, window, in_plane=in_plane, holds_w=holds_w, points=points
+        )
 
     def boundary(
         self,
@@ -271,12 +278,15 @@ class ElementGrid:
         window: tuple[float, float] | None = None,
         *,
         in_plane: str = "held",
+        holds_w: bool = True,
+        points: Sequence[int] = (),
     ) -> Boundary | None:
         """Return BOUN cards; None if nothing is restrained.
 
         `everywhere` has the codes of all nodes, and `edges` further codes of the nodes on each of
         the :data:`EDGES`. `window` has the sides of a window in the middle of the plate: its edges
-        hold w, and u and v as `in_plane` tells.
+        hold u and v as `in_plane` tells, and w unless `holds_w` is false. w of the nodes `points`,
+        from 1, is held too.
         """
         codes = np.tile(np.array(everywhere), (self.up, self.across, 1))
         parts = {"left": codes[:, 0], "right": codes[:, -1], "bottom": codes[0], "top": codes[-1]}
@@ -286,12 +296,25 @@ class ElementGrid:
             first, last = _nearest_lines(self.columns, window[0])
             low, high = _nearest_lines(self.rows, window[1])
             across, up = slice(first, last + 1), slice(low, high + 1)
-            along_x, along_y = (np.array([*held, *W_HELD]) for held in IN_PLANE[in_plane])
+            bending = W_HELD if holds_w else W_FREE
+            along_x, along_y = (np.array([*held, *bending]) for held in IN_PLANE[in_plane])
             for line in (low, high):
                 codes[line, across] = np.maximum(codes[line, across], along_x)
             for line in (first, last):
                 codes[up, line] = np.maximum(codes[up, line], along_y)
-        return boundary_cards(codes.reshape(self.nodes, -1))
+        of_nodes = codes.reshape(self.nodes, -1)
+        of_nodes[np.array(points, dtype=int) - 1, 2] = 1
+        return boundary_cards(of_nodes)
+
+    def window_lines(self, window: tuple[float, float]) -> list[tuple[int, int]]:
+        """Return the nodes, from 1, at the ends of each side of a window in the middle."""
+        first, last = _nearest_lines(self.columns, window[0])
+        low, high = _nearest_lines(self.rows, window[1])
+        corners = [
+            1 + i + j * self.across
+            for i, j in ((first, low), (last, low), (last, high), (first, high))
+        ]
+        return list(pairwise([*corners, corners[0]]))
 
 
 def _nearest_lines(sections: Sequence[GridSection], side: float) -> tuple[int, int]:

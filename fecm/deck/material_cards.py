@@ -309,6 +309,8 @@ class Damping(Segment, keyword="DAMP"):
 class Nonlinear(Segment, keyword="NONL"):
     """NONL: the plate stretches as it bends, von Karman (not in the report's program)."""
 
+    is_nonlinear: ClassVar[bool] = True
+
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self:
         """Read the keyword card, the only card of the segment."""

@@ -44,6 +44,7 @@ from fecm.deck.mesh_cards import (
 )
 from fecm.deck.output_cards import Gage, Gages, Page, PrintOption, Units
 from fecm.deck.segment import NumberedSegment, Segment
+from fecm.deck.support_cards import OneSidedSupport, OneSidedSupports, PointMasses, Springs
 from fecm.deck.zone_cards import (
     LaminateNumber,
     Laminates,
@@ -63,9 +64,9 @@ __all__ = [
     "Deck", "Delamination", "ElementNodes", "Elements", "Expansion", "Forces", "Gage", "Gages",
     "Impact", "Indentation", "Integration", "LaminateNumber", "Laminates", "Layer", "LoadTable",
     "Macro", "Material", "MaterialNumber", "Materials", "NodeCodes", "NodeValues", "Nonlinear",
-    "NumberedLaminate", "NumberedPly", "NumberedSegment", "Page", "Patch", "Ply", "Preload",
-    "PrintOption", "Projectile", "Record", "RodDiameter", "Segment", "Shear", "Units", "Zone",
-    "Zones",
+    "NumberedLaminate", "NumberedPly", "NumberedSegment", "OneSidedSupport", "OneSidedSupports",
+    "Page", "Patch", "Ply", "PointMasses", "Preload", "PrintOption", "Projectile", "Record",
+    "RodDiameter", "Segment", "Shear", "Springs", "Units", "Zone", "Zones",
 ]  # fmt: skip
 
 TITLE = "FECM"
@@ -77,6 +78,9 @@ SEGMENTS: dict[str, type[Segment]] = {
     "COOR": Coordinates,
     "ELEM": Elements,
     "BOUN": Boundary,
+    "SPRI": Springs,
+    "UNIL": OneSidedSupports,
+    "MASS": PointMasses,
     "MATE": Material,
     "MATS": Materials,
     "LAMS": Laminates,
@@ -142,6 +146,17 @@ class Deck(Record):
         macros = " ".join(macro.word for macro in self.macros)
         rows = (("segments", shorten(segments, 200)), ("macros", shorten(macros, 200)))
         return html_summary(self, rows)
+
+    @property
+    def nonlinear_words(self) -> str:
+        """Keywords of the segments by which the motion is not linear in the loads; "" if it is."""
+        words = (segment.keyword for segment in self.segments if segment.is_nonlinear)
+        return " and ".join(dict.fromkeys(words))
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the motion of the plate is linear in its loads."""
+        return not self.nonlinear_words
 
     def has(self, kind: type[Segment]) -> bool:
         """Return whether the deck has a segment of one kind."""

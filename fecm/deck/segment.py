@@ -199,6 +199,8 @@ class Segment(Record):
     keyword: ClassVar[str]
     # Whether the card of data begins with a letter, as a keyword card does.
     is_worded: ClassVar[bool] = False
+    # Whether the motion of a plate with the segment is not linear in its loads.
+    is_nonlinear: ClassVar[bool] = False
 
     def __init_subclass__(cls, keyword: str = "") -> None:
         super().__init_subclass__()

@@ -17,7 +17,7 @@ from fecm._table import html_summary
 from fecm._typing import Floats
 from fecm._watch import SILENT, StoppedError, Watch
 from fecm.authoring.strike_values import lacks_value, strike_of
-from fecm.deck.model import Deck, Impact, Indentation, Nonlinear, Projectile
+from fecm.deck.model import Deck, Impact, Indentation, Projectile
 from fecm.deck.units import unit_names
 from fecm.identification.alignment import IdentifyError, check_measured, lags
 from fecm.identification.fitting import (
@@ -288,10 +288,11 @@ def identify(
 def _shared_backend(deck: Deck) -> Backend:
     """Return the back end that computes impacts from the response of the deck's plate."""
     problem = sole_problem(deck, warns=False)
-    if problem.deck.has(Nonlinear):
+    if words := problem.deck.nonlinear_words:
         raise StudyError(
-            "identify needs a linear plate, and the deck has NONL; fit a test at an energy that "
-            "leaves the deflection below a quarter of the plate's thickness, without NONL"
+            f"identify needs a linear plate, and the deck has {words}; fit a test at an energy "
+            "that leaves the deflection below a quarter of the plate's thickness, without NONL, on "
+            "supports that hold (fecm new --window held)"
         )
     if not shares_plate(problem):
         loads = "FORC, EXCD, TANG, FORM and SOLV"

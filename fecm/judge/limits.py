@@ -289,8 +289,8 @@ PULL = ModelLimit(
     "pull of the supports over a static load",
     0.1,
     note="the supports pull the plate down with {pull:.0%} of a static load at the impact; a "
-    "window or a ring can only push: the plate lifts off there, is softer, and its peak force is "
-    "lower",
+    "window or a ring can only push: {band}",
+    remedy="fecm new --window push models it, with --clamps the clamps of a standard",
 )
 GRAVITY = ModelLimit(
     "rise of the force by gravity",

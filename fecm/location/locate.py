@@ -14,7 +14,7 @@ from fecm._options import documented, with_parameters_of
 from fecm._table import html_summary
 from fecm._typing import Floats
 from fecm._watch import SILENT, StoppedError, Watch
-from fecm.deck.model import Gages, Nonlinear
+from fecm.deck.model import Gages
 from fecm.deck.units import unit_names
 from fecm.location.causes import BETTER, Cause, likely_cause
 from fecm.location.fit import LocationFit, PlaceTrial, judged_force
@@ -101,10 +101,11 @@ class LocationJob(LocationOptions):
         self.check()
         self.problem: Problem = sole_problem(self.deck, warns=False)
         deck = self.problem.deck
-        if deck.has(Nonlinear):
+        if words := deck.nonlinear_words:
             raise StudyError(
-                "locate needs a linear plate, and the deck has NONL; take an impact that leaves "
-                "the deflection below a quarter of the plate's thickness, without NONL"
+                f"locate needs a linear plate, and the deck has {words}; take an impact that "
+                "leaves the deflection below a quarter of the plate's thickness, without NONL, on "
+                "supports that hold (fecm new --window held)"
             )
         cards = deck.last(Gages)
         numbers = [card.number for card in cards.records] if cards is not None else []

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
@@ -21,10 +21,17 @@ from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics import element_matrices
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import Quadrature
-from fecm.mechanics.interpolation import NDOF, jacobian_determinants
+from fecm.mechanics.interpolation import NDOF, W, jacobian_determinants
 from fecm.mechanics.laminate import LaminateSection
-from fecm.mechanics.mesh import ElementBlock, MeshArrays, element_blocks, rigid_deflections
+from fecm.mechanics.mesh import (
+    ElementBlock,
+    MeshArrays,
+    element_blocks,
+    equation_numbers,
+    rigid_deflections,
+)
 from fecm.mechanics.strains import FLAT, Curvature, Rows, StrainField
+from fecm.mechanics.supports import NodeSupports
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -63,6 +70,10 @@ class PlateModel:
     nonlinear : bool
         Whether the plate stretches as it bends (NONL); `stiffness` is then that of the plate at
         rest.
+    supports : NodeSupports or None
+        Springs and one-sided supports (SPRI, UNIL); `stiffness` contains the springs.
+    added_mass : ndarray (numnp, 5) or None
+        Masses at the nodes beside the laminate's (MASS), mass; mass*length^2 for rotations.
     """
 
     mesh: MeshArrays
@@ -75,6 +86,8 @@ class PlateModel:
     # (numel,): laminate number of every element, from 0; None if all have the first laminate.
     laminate_numbers: Indices | None = None
     curvature: Curvature = FLAT  # 1/R_x, 1/R_y, 1/R_xy of a shallow panel, 1/length
+    supports: NodeSupports | None = None
+    added_mass: Floats | None = None
 
     def __repr__(self) -> str:
         nodes, elements = len(self.mesh.coordinates), len(self.mesh.elements)
@@ -124,6 +137,33 @@ class PlateModel:
     def moves_in_plane(self) -> bool:
         """Whether u and v move with w: B, the curvature or finite deflections couple them."""
         return self.is_coupled or self.is_curved or self.nonlinear
+
+    @cached_property
+    def supported(self) -> MeshArrays:
+        """The mesh in which springs and one-sided supports count as restraints."""
+        mesh = self.mesh
+        if self.supports is None:
+            return mesh
+        codes = mesh.codes.copy()
+        codes[self.supports.node, self.supports.dof] = 1
+        return replace(mesh, codes=codes, equations=equation_numbers(codes))
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the internal force is K u: no finite deflections and no one-sided supports."""
+        return not (self.nonlinear or self.lifts)
+
+    @property
+    def lifts(self) -> bool:
+        """Whether the plate has one-sided supports, from which it may lift off."""
+        return self.supports is not None and bool(self.supports.is_one_sided.any())
+
+    @property
+    def held(self) -> PlateModel:
+        """The plate with all one-sided supports closed; itself without them."""
+        if self.supports is None or not self.lifts:
+            return self
+        return replace(self, supports=self.supports.held())
 
     @property
     def is_preloaded(self) -> bool:
@@ -240,7 +280,18 @@ class PlateModel:
         NotEnoughMemoryError
             If the assembly needs more memory than is free; a MemoryError.
         """
-        return self._with_supports[:, : self.neq].tocsr()
+        elements = self._with_supports[:, : self.neq].tocsr()
+        if self.supports is None:
+            return elements
+        return elements + self.spring_matrix(~self.supports.is_one_sided)
+
+    def spring_matrix(self, rows: Bools) -> sparse.dia_array:
+        """Return the diagonal stiffness, (neq, neq), of the supports of a mask."""
+        from scipy import sparse  # 0.16 s, which most runs don't need
+
+        assert self.supports is not None
+        diagonal = self.supports.diagonal(rows, len(self.mesh.coordinates))[self._free]
+        return sparse.diags_array(diagonal)
 
     @cached_property
     def support(self) -> sparse.csr_array:
@@ -266,7 +317,12 @@ class PlateModel:
                 determinants_of_part = determinants[number * BLOCK : (number + 1) * BLOCK]
                 lumped = element_matrices.lumped_mass(part, laminate, rule, determinants_of_part)
                 np.add.at(mass, self._dofs(part).ravel(), lumped.ravel())
-        return mass[: self.neq]
+        return mass[: self.neq] + self._added_mass
+
+    @property
+    def _added_mass(self) -> Floats | float:
+        """Masses of MASS, (neq,); 0 without."""
+        return 0.0 if self.added_mass is None else self.added_mass[self._free]
 
     @cached_property
     def consistent_mass(self) -> sparse.csr_array:
@@ -279,11 +335,16 @@ class PlateModel:
         NotEnoughMemoryError
             If the assembly needs more memory than is free; a MemoryError.
         """
+        from scipy import sparse  # 0.16 s, which most runs don't need
+
         rule = self.rules.bending
         with_supports = self.assembled(
             lambda f: element_matrices.consistent_mass(f, self.laminate_of(f), rule)
         )
-        return with_supports[:, : self.neq].tocsr()
+        mass = with_supports[:, : self.neq].tocsr()
+        if self.added_mass is None:
+            return mass
+        return mass + sparse.diags_array(self.added_mass[self._free])
 
     @cached_property
     def _areas(self) -> list[float]:
@@ -297,10 +358,11 @@ class PlateModel:
 
     def total_mass(self) -> float:
         """Return the mass of the plate, force*time^2/length."""
+        added = 0.0 if self.added_mass is None else float(self.added_mass[:, W].sum())
         if not self.others:
-            return self.area() * self.laminate.mass
+            return self.area() * self.laminate.mass + added
         masses = (self.laminate_of(family).mass for family in self.families)
-        return sum(a * m for a, m in zip(self._areas, masses, strict=True))
+        return sum(a * m for a, m in zip(self._areas, masses, strict=True)) + added
 
     def profile(self) -> int:
         """Count the entries of K from the first one of each column: the listing's JDIAG(NEQ)."""
@@ -321,7 +383,8 @@ class PlateModel:
         for dofs, K in self._element_matrices(self.stiffness_of):
             local = np.einsum("eij,ej->ei", K, order[dofs])
             forces += np.bincount(dofs.ravel(), local.ravel(), len(forces))
-        return np.asarray(forces[self._numbers])
+        total = np.asarray(forces[self._numbers])
+        return total if self.supports is None else total + self.supports.forces(field)
 
     @property
     def nodal_loads(self) -> Floats:
@@ -359,7 +422,7 @@ class PlateModel:
 
         `share` (numnp,) is the distribution of the unit force over w of the nodes.
         """
-        motions = rigid_deflections(self.mesh)
+        motions = rigid_deflections(self.supported)
         if not motions.size:
             return 0.0
         mass = self.field(self.mass, 0.0)[:, 2]

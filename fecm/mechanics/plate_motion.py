@@ -282,7 +282,7 @@ class PlateMotion:
         self._scale_for(state.dt2)
         sums = self.product.each(state.padded, partial(self._piece_sums, state))
         state.sums = sums[0] if len(sums) == 1 else Sums(*map(sum, zip(*sums, strict=True)))
-        if self.plate.nonlinear:
+        if not self.plate.is_linear:
             state.sums = state.sums._replace(quadratic=self.product.quadratic_work)
 
     def prescribe(self, state: PlateState, factor: float) -> bool:

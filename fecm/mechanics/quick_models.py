@@ -181,6 +181,8 @@ class _Path:
         self.load = reduction.gather(contact)
         self._stiffness = reduction.reduced(plate.stiffness, plate.mesh.equations > 0)
         self._membrane = MembraneForces(plate, reduction.weights.astype(float))
+        supports = plate.supports
+        self._lifting = None if supports is None else supports.select(supports.is_one_sided)
         self._factorise(np.zeros(reduction.count))
 
     def _factorise(self, u: Floats) -> None:
@@ -196,8 +198,11 @@ class _Path:
 
     def internal(self, u: Floats) -> Floats:
         """Return the internal forces f(u), (n,)."""
-        membrane, _ = self._membrane.forces(self._reduction.field(u))
-        return np.asarray(self._stiffness @ u + self._reduction.gather(membrane))
+        field = self._reduction.field(u)
+        forces, _ = self._membrane.forces(field)
+        if self._lifting is not None:
+            forces = forces + self._lifting.forces(field)
+        return np.asarray(self._stiffness @ u + self._reduction.gather(forces))
 
     def equilibrium(self, u: Floats) -> Floats | None:
         """Return the equilibrium of the deflection of a displacement; None without convergence.

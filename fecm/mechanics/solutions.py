@@ -11,11 +11,12 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._machine import require_memory
-from fecm._typing import Bools, Floats
+from fecm._typing import Floats, Indices
 from fecm.mechanics.element_matrices import geometric_stiffness
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.membrane import MembraneForces, tangent
 from fecm.mechanics.plate import UNLOADED, PlateModel
+from fecm.mechanics.supports import NodeSupports
 from fecm.mechanics.symmetry import (
     SymmetryReduction,
     restrain_plane,
@@ -41,6 +42,7 @@ SHIFT = 1.0e-9
 # Bytes of the factors of n equations without coupling, over n log2 n: an upper bound of measured
 # sizes.
 FACTORS = 300
+MOST_ACTIVE_SETS = 50  # of one-sided supports; up to 19 were seen
 # A rigid motion is free if its eigenvalue, relative to the largest, is smaller.
 NOT_HELD = 1.0e-9
 
@@ -56,18 +58,27 @@ class ConvergenceError(FecmError, ArithmeticError):
 
 
 def tangent_stiffness(
-    plate: PlateModel, field: Floats | None, reduction: SymmetryReduction | None = None
+    plate: PlateModel,
+    field: Floats | None,
+    reduction: SymmetryReduction | None = None,
+    *,
+    held: bool = False,
 ) -> sparse.csr_array:
     """Return the stiffness about a displacement field, (numnp, 5).
 
     It is sparse, (neq, neq), or that of the independent dofs of a reduction. The stiffness of a
-    linear plate, and at rest (`field` is None), is K.
+    linear plate, and at rest (`field` is None), is K. One-sided supports that are closed at the
+    displacement count as springs; with `held` all are closed.
     """
     stiffness = plate.stiffness
     if plate.nonlinear and (current := field) is not None:
         weights = (reduction or unreduced(plate)).weights
         added = plate.assembled(lambda block: tangent(plate, block, current), weights)
         stiffness = (stiffness + added[:, : plate.neq]).tocsr()
+    if plate.supports is not None and plate.lifts:
+        at = np.zeros(plate.mesh.equations.shape) if field is None else field
+        closed = held | plate.supports.closed(plate.supports.of(at))
+        stiffness = stiffness + plate.spring_matrix(closed & plate.supports.is_one_sided)
     if reduction is None:
         return stiffness
     return reduction.reduced(stiffness, plate.mesh.equations > 0)
@@ -147,8 +158,9 @@ class Tangent:
     """Factorised stiffness about a field.
 
     Loads and displacements, (neq,), are those of the independent dofs of a reduction by symmetry,
-    and of all equations without one.  Rigid motions in the plane are pinned, so that they need no
-    supports.  Raises SingularStiffnessError if the stiffness is singular.
+    and of all equations without one.  With `held` all one-sided supports are closed.  Rigid motions
+    in the plane are pinned, so that they need no supports.  Raises SingularStiffnessError if the
+    stiffness is singular.
     """
 
     def __init__(
@@ -156,10 +168,12 @@ class Tangent:
         plate: PlateModel,
         field: Floats | None = None,
         reduction: SymmetryReduction | None = None,
+        *,
+        held: bool = False,
     ) -> None:
         from scipy.sparse import diags_array  # 0.2 s, which most runs don't need
 
-        self._stiffness = pinned = tangent_stiffness(plate, field, reduction)
+        self._stiffness = pinned = tangent_stiffness(plate, field, reduction, held=held)
         # Independent dofs, from 0, that hold the plate in its plane.
         self.pins = in_plane_pins(plate, reduction)
         if self.pins:
@@ -190,15 +204,111 @@ class Tangent:
         return change
 
 
+class StaticResponse(NamedTuple):
+    """Static response of a plate to a unit force, at rest: stretching is left out.
+
+    Attributes
+    ----------
+    field : ndarray (numnp, 5)
+        Displacement per force.
+    compliance : float
+        Displacement in the direction of the force, per force.
+    supports : NodeSupports or None
+        The springs, and the one-sided supports that the force closes, without gaps.
+    """
+
+    field: Floats
+    compliance: float
+    supports: NodeSupports | None
+
+    @property
+    def gain(self) -> float:
+        """Relative gain of flexibility by the stiffness of the one-sided supports.
+
+        To first order it is the sum of r^2/(k C), with the reactions r to the unit force and the
+        compliance C.
+        """
+        if self.supports is None:
+            return 0.0
+        rows = self.supports.select(self.supports.is_one_sided)
+        reactions = rows.reactions(rows.of(self.field))
+        return float((reactions**2 / rows.stiffness).sum()) / self.compliance
+
+
+def static_response(plate: PlateModel, contact: Floats) -> StaticResponse:
+    """Compute the response to a unit force, whose nodal forces are `contact`, (numnp, 5).
+
+    One-sided supports have no gaps here, so that displacements are proportional to the force.  The
+    supports that the force closes are an active set.  It is found from the response of the plate
+    with all supports closed: opening supports of the stiffness k adds the displacement
+
+        Z (1/k - G)^-1 c,
+
+    where Z are the displacements by unit forces on these supports, and G and c the displacements of
+    the supports by the unit forces and by the load (Sherman, Morrison and Woodbury).
+
+    Raises
+    ------
+    SingularStiffnessError
+        If the supports that are closed do not hold the plate.
+    ConvergenceError
+        If the active set does not settle.
+    """
+    # At rest u and v of a flat plate of an uncoupled laminate do not move with w.
+    reduction = symmetry_reduction(replace(plate, nonlinear=False), contact)
+    load = reduction.gather(contact)
+    tangent = Tangent(plate, reduction=reduction, held=True)
+    u = tangent.solve(load)
+    supports = None if plate.supports is None else plate.supports.without_gaps()
+    if supports is None or not plate.lifts:
+        return StaticResponse(reduction.field(u), float(load @ u), supports)
+    one_sided = supports.select(supports.is_one_sided)
+    keys = np.column_stack([reduction.index[one_sided.node, W], one_sided.side])
+    (dofs, side), which = _distinct(keys)
+    stiffness = np.bincount(which, one_sided.stiffness)
+    unit = np.zeros((len(load), len(dofs)))
+    unit[dofs, np.arange(len(dofs))] = 1.0
+    Z = tangent.approximate(unit)
+    G, c = Z[dofs], u[dofs]
+    is_open = np.zeros(len(dofs), dtype=bool)
+    for _ in range(MOST_ACTIVE_SETS):
+        resistance = np.diag(1.0 / stiffness[is_open]) - G[np.ix_(is_open, is_open)]
+        if not _is_positive_definite(resistance):
+            raise SingularStiffnessError("the plate tips off its one-sided supports")
+        opened = np.linalg.solve(resistance, c[is_open])
+        opens = side * (c + G[:, is_open] @ opened) < 0.0
+        if np.array_equal(opens, is_open):
+            displacement = u + Z[:, is_open] @ opened
+            closed = ~supports.is_one_sided
+            closed[supports.is_one_sided] = ~is_open[which]
+            field = reduction.field(displacement)
+            return StaticResponse(field, float(load @ displacement), supports.select(closed))
+        is_open = opens
+    raise ConvergenceError(
+        f"the one-sided supports (UNIL) open and close in turns after {MOST_ACTIVE_SETS} solutions"
+    )
+
+
+def _distinct(keys: Floats) -> tuple[tuple[Indices, Floats], Indices]:
+    """Return distinct pairs of a dof and a side, and the pair of each row."""
+    pairs, which = np.unique(keys, axis=0, return_inverse=True)
+    return (pairs[:, 0].astype(np.intp), pairs[:, 1]), which.ravel()
+
+
+def _is_positive_definite(matrix: Floats) -> bool:
+    try:
+        np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
 def compliance(plate: PlateModel, contact: Floats) -> float:
     """Return the displacement under a unit force in the direction of the force.
 
-    `contact`, (numnp, 5), are the nodal forces of the unit force.  Raises SingularStiffnessError
-    for a plate that is not held.
+    See :func:`static_response`.
     """
-    reduction = symmetry_reduction(plate, contact)
-    load = reduction.gather(contact)
-    return float(load @ Tangent(plate, reduction=reduction).solve(load))
+    return static_response(plate, contact).compliance
 
 
 def static_stiffness(plate: PlateModel, contact: Floats) -> float:
@@ -209,32 +319,19 @@ def static_stiffness(plate: PlateModel, contact: Floats) -> float:
         return math.nan
 
 
-def static_support(
-    plate: PlateModel, contact: Floats, symmetry: Bools | None = None
-) -> tuple[float, float] | None:
-    """Return the stiffness under a static unit load, (numnp, 5), and the pull of the supports.
+def pull_of_supports(plate: PlateModel, response: StaticResponse, contact: Floats) -> Floats:
+    """Return the force with which each node's supports pull under a static load, (numnp,).
 
-    The stiffness is the force per displacement under the load.  The pull is the sum of the forces
-    that hold the plate down.  Only nodes whose w is held and whose rotations are free count, except
-    dofs that lines of symmetry hold, a mask (numnp, 5): such a support stands for a ring, a window
-    or a knife edge, which can only push.  Returns None for a plate without such nodes, and for a
-    plate that its supports do not hold.
+    It is the force along the load, per force: supports push against the load.  `contact`,
+    (numnp, 5), are the nodal forces of the unit load.
     """
-    free = plate.mesh.equations > 0
-    turns = free if symmetry is None else free | symmetry
-    rests = ~free[:, W] & turns[:, W + 1 :].all(axis=1)
-    if not rests.any():
-        return None
-    reduction = symmetry_reduction(plate, contact)
-    load = reduction.gather(contact)
-    try:
-        displacement = Tangent(plate, reduction=reduction).solve(load)
-    except SingularStiffnessError:
-        return None
-    # The supports push against the load, and pull in its direction.
-    field = reduction.field(displacement)
-    forces = plate.internal_forces(field)[rests, W] * np.sign(contact[:, W].sum())
-    return 1.0 / float(load @ displacement), float(forces[forces > 0.0].sum())
+    field, along = response.field, float(np.sign(contact[:, W].sum()))
+    restrained = plate.mesh.equations[:, W] == 0
+    forces = np.where(restrained, plate.internal_forces(field)[:, W], 0.0)
+    if response.supports is not None:
+        on_w = response.supports.select(response.supports.dof == W)
+        forces -= on_w.forces(field)[:, W] * ~restrained
+    return np.maximum(along * forces, 0.0)
 
 
 def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:

@@ -23,6 +23,7 @@ from fecm.mechanics.kernels.plate import CompiledProduct
 from fecm.mechanics.membrane import MembraneForces
 from fecm.mechanics.mesh import distinct
 from fecm.mechanics.plate import PlateModel, R, StiffnessOperator, pieces
+from fecm.mechanics.supports import NodeSupports
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 
 if TYPE_CHECKING:
@@ -227,7 +228,7 @@ class NonlinearProduct(StiffnessOperator):
     def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
         """Compute the internal forces and apply a function to each piece."""
         reduction = self._kept
-        field = reduction.sign * np.append(padded[: reduction.count], 0.0)[reduction.index]
+        field = reduction.field(padded[: reduction.count])
         if self.prescribed is not None:
             field += self.prescribed
         forces, self.quadratic_work = self._membrane.forces(field)
@@ -235,9 +236,36 @@ class NonlinearProduct(StiffnessOperator):
             # Subtract the work of the supports: u f contains only the independent dofs.
             self.quadratic_work -= float((forces * self.prescribed).sum())
         quadratic = reduction.gather(forces)
-        return self._linear.each(
+        answers = self._linear.each(
             padded, lambda number, linear: use(number, linear + quadratic[self._pieces[number]])
         )
+        self.quadratic_work += self._linear.quadratic_work
+        return answers
+
+
+class SupportedProduct(StiffnessOperator):
+    """Internal forces with those of supports at nodes."""
+
+    def __init__(
+        self, product: StiffnessOperator, supports: NodeSupports, reduction: SymmetryReduction
+    ) -> None:
+        self._product, self._reduction = product, reduction
+        moves = reduction.sign[supports.node, supports.dof] != 0.0
+        self._supports = supports.select(moves)
+        self._pieces = pieces(reduction.count)
+        self.size = product.size
+
+    def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
+        """Compute the internal forces and apply a function to each piece."""
+        reduction, supports = self._reduction, self._supports
+        field = reduction.field(padded[: reduction.count])
+        added = reduction.gather(supports.forces(field))
+        answers = self._product.each(
+            padded, lambda number, forces: use(number, forces + added[self._pieces[number]])
+        )
+        self.quadratic_work = self._product.quadratic_work
+        self.quadratic_work += supports.excess_work(supports.of(field))
+        return answers
 
 
 def resolved(solver: str) -> str:
@@ -256,14 +284,19 @@ def stiffness_operator(
     """Build the operator K u of a plate, for all dofs or for the independent dofs of `reduced`.
 
     K is the stiffness at rest, even for a nonlinear plate; see :func:`internal_force_operator`.
+    The forces of one-sided supports are added to K u.
 
     The solver is one of `SOLVERS`.  ``"csr"`` uses the sparse matrix of all dofs.  The others work
     element by element, with one matrix for a large enough group of congruent elements.
     """
     solver = resolved(solver)
-    if solver == CSR:
-        return CsrProduct(plate.stiffness)
     reduction = reduced or unreduced(plate)
+    if solver == CSR:
+        of_all = CsrProduct(plate.stiffness)  # with the springs
+        if plate.supports is None or not plate.lifts:
+            return of_all
+        lifting = plate.supports.select(plate.supports.is_one_sided)
+        return SupportedProduct(of_all, lifting, reduction)
     if solver == KERNELS:
         return CompiledProduct(plate, reduction, 1 if workers is None else workers.count)
     domains: list[list[Group]] = []
@@ -295,7 +328,10 @@ def stiffness_operator(
                 K = plate.stiffness_of(family.take(rows))
                 groups.append((weights[rows, None, None] * K, dof_indices[rows]))
             domains.append(groups)
-    return ElementProduct(domains, reduction.count, signed=reduction.signed, workers=workers)
+    product = ElementProduct(domains, reduction.count, signed=reduction.signed, workers=workers)
+    if plate.supports is None:
+        return product
+    return SupportedProduct(product, plate.supports, reduction)
 
 
 def internal_force_operator(

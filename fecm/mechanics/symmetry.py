@@ -192,6 +192,10 @@ def _images(plate: PlateModel, contact: Floats | None) -> tuple[Indices, Indices
         return None
     if (free != free[nodes]).any() or (mesh.forces != TURNED * mesh.forces[nodes]).any():
         return None
+    if plate.supports is not None and not plate.supports.is_invariant(nodes):
+        return None
+    if plate.added_mass is not None and (plate.added_mass != plate.added_mass[nodes]).any():
+        return None
     elements = np.full(len(mesh.elements), -1, dtype=np.intp)
     for family in plate.families:
         opposite = opposite_nodes(family)

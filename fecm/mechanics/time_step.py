@@ -302,7 +302,19 @@ def safe_time_step(model: PlateModel) -> float:
             if not len(members):
                 break
             fastest = _largest_element_eigenvalue(model, unlike.take(members), fastest)
-    return 2.0 / float(np.sqrt(fastest))
+    return 2.0 / float(np.sqrt(fastest + _largest_ratio_of_supports(model)))
+
+
+def _largest_ratio_of_supports(model: PlateModel) -> float:
+    """Return the largest stiffness over mass of the springs at a dof; all supports are closed.
+
+    lambda_max(M^-1 (K + K_s)) is at most lambda_max(M^-1 K) plus this ratio.
+    """
+    if model.supports is None:
+        return 0.0
+    every = np.ones(len(model.supports.node), dtype=bool)
+    springs = model.supports.diagonal(every, len(model.mesh.coordinates))
+    return float((springs[model.mesh.equations > 0] / model.mass).max(initial=0.0))
 
 
 def _largest_element_eigenvalue(model: PlateModel, block: ElementBlock, floor: float) -> float:
@@ -363,7 +375,7 @@ def _accelerations(model: PlateModel) -> tuple[Callable[[Floats], Floats], Float
     Entries without an equation have no mass and stay 0.  The next call of the product overwrites
     its result.
     """
-    operator = stiffness_operator(model)
+    operator = stiffness_operator(model.held)
     if not isinstance(operator, CompiledProduct):
         return lambda u: operator(u) / model.mass, model.mass, np.arange(model.neq)
     compiled = operator.plate

@@ -37,12 +37,14 @@ from fecm.problem.rules import (
     program,
     projectile,
     quadrature,
+    supports,
     symmetry,
     time_step,
     units,
     zones,
 )
 from fecm.problem.rules import listing as listing_mode
+from fecm.problem.supports import report_unknown_nodes
 
 ELEMENT_ERRORS = ("E303", "E304", "E305")  # after which the numbers of elements mean nothing
 
@@ -89,8 +91,23 @@ def _generated(
         apply(mesh.OF_NODES, findings, checked)
         if checked.mesh.given.all():
             apply(mesh.OF_PLACES, findings, checked)
+            _check_supports(checked, findings)
             _check_shapes(checked, findings, uses_l2=uses_l2)
     return checked
+
+
+def _check_supports(checked: Problem, findings: Findings) -> None:
+    """Check springs, one-sided supports and point masses on a complete mesh."""
+    deck = checked.deck
+    if not any(deck.has(kind) for kind in supports.KINDS):
+        return
+    before = findings.error_count
+    apply(supports.OF_CARDS, findings, deck)
+    apply(supports.OF_LINES, findings, checked)
+    if findings.error_count == before:
+        report_unknown_nodes(deck, checked.mesh, findings)
+    if findings.error_count == before:
+        apply(supports.OF_NODES, findings, checked)
 
 
 def _element_errors(findings: Findings) -> int:
@@ -279,6 +296,8 @@ def check_values(checked: Problem, findings: Findings) -> None:
             apply(rules, findings, checked, segment)
     if is_curved(deck):
         apply(curvature.VALUES, findings, checked)
+    if checked.plate.supports is not None:
+        apply(supports.VALUES, findings, checked)
     if (damping := deck.last(model.Damping)) is not None:
         apply_first(time_step.VALUES_OF_DAMPING, findings, checked, damping)
     if (strengths := deck.last(model.Allowables)) is not None:

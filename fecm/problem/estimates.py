@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from fecm.deck import model
 from fecm.deck.model import Impact
 from fecm.judge.exposure_bands import LoadMesh
 from fecm.judge.limits import ELEMENTS_PER_WAVE
+from fecm.mechanics.interpolation import W
 from fecm.mechanics.laminate import effective_rigidity
 from fecm.mechanics.mesh import longest_sides
 from fecm.mechanics.quick_models import (
@@ -27,10 +29,13 @@ from fecm.mechanics.quick_models import (
     static_peak,
     static_plate,
 )
-from fecm.mechanics.solutions import ConvergenceError, SingularStiffnessError, static_stiffness
+from fecm.mechanics.solutions import ConvergenceError, SingularStiffnessError, static_response
+from fecm.mechanics.supports import one_sided
+from fecm.mechanics.symmetry import with_codes
 from fecm.problem.contact_estimates import wave_impedance
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
+from fecm.problem.supports import default_stiffness
 
 MOST_ERROR = 0.5  # largest mesh error of the peak that is estimated
 NINE_NODES = 9
@@ -218,9 +223,34 @@ def nonlinear_curve(problem: Problem, energy: float, force: float) -> StaticCurv
 
 def whole_stiffness(problem: Problem) -> float:
     """Return the static stiffness of the whole plate under its load; NaN for a free plate."""
-    assert problem.contact is not None  # the program has impact steps
-    factor = problem.symmetry.factor
-    return factor * static_stiffness(problem.moving_plate, problem.contact)
+    response = problem.static
+    return math.nan if response is None else problem.symmetry.factor / response.compliance
+
+
+def pushing_compliance(problem: Problem) -> float:
+    """Return the static compliance of a plate whose knife edges only push, for the part of a deck.
+
+    The edges have the default stiffness of UNIL. The compliance is NaN if the plate tips off them.
+    """
+    plate, contact, edges = problem.moving_plate, problem.contact, problem.knife_edges
+    assert contact is not None  # the program has impact steps
+    codes = plate.mesh.codes.copy()
+    codes[edges, W] = 0
+    springs = plate.supports
+    if springs is not None:
+        is_edge = edges[springs.node] & (springs.dof == W) & ~springs.is_one_sided
+        springs = springs.select(~is_edge)
+    free = replace(with_codes(plate, codes), supports=springs)
+    (nodes,) = np.nonzero(edges)
+    stiffness = default_stiffness(free, problem.safe_time_step)[nodes]
+    side = np.full(len(nodes), np.sign(contact[:, W].sum()))
+    supports = one_sided(nodes, side, stiffness, np.zeros(len(nodes)))
+    if springs is not None:
+        supports = supports.joined(springs)
+    try:
+        return static_response(replace(free, supports=supports), contact).compliance
+    except (SingularStiffnessError, ConvergenceError):
+        return math.nan
 
 
 def contact_duration(problem: Problem) -> float:

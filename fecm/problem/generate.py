@@ -82,6 +82,19 @@ def generate(
     return MeshArrays(coordinates, elements, codes, forces, equation_numbers(codes))
 
 
+def node_values(
+    records: Sequence[NodeValues],
+    shape: tuple[int, int],
+    findings: Findings | None = None,
+    blank: float = 0.0,
+) -> Floats:
+    """Return values of all nodes, generated between cards as coordinates are; `blank` elsewhere."""
+    noted = Findings() if findings is None else findings
+    values = np.full(shape, blank)
+    _interpolate(values, records, noted, _Budget(len(values), noted))
+    return values
+
+
 def restraint_codes(
     boundaries: Sequence[Boundary], nodes: int, dofs: int, findings: Findings | None = None
 ) -> Ints:

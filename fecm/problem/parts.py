@@ -12,7 +12,7 @@ import numpy as np
 from fecm._typing import Indices
 from fecm.deck import model
 from fecm.deck.material_cards import MATERIAL
-from fecm.deck.model import Deck, RodDiameter
+from fecm.deck.model import Deck, PointMasses, RodDiameter
 from fecm.listing.law import ListingLaw
 from fecm.listing.variant import REPORT_IMPACT, REPORT_PLATE, ImpactVariant, PlateVariant
 from fecm.mechanics import contact_law
@@ -34,6 +34,7 @@ from fecm.mechanics.projectile import (
 )
 from fecm.mechanics.strains import FLAT
 from fecm.problem.generate import rod_diameters
+from fecm.problem.supports import node_supports, point_masses
 
 if TYPE_CHECKING:
     from fecm.mechanics.ply_stresses import Residual
@@ -63,7 +64,7 @@ def build_plate(deck: Deck, mesh: MeshArrays, variant: PlateVariant = REPORT_PLA
         bending=bending, shear=shear, strains=points, assumes_shear=has_assumed_shear(deck)
     )
     preload, curved = deck.last(model.Preload), deck.last(model.Curvature)
-    return PlateModel(
+    plate = PlateModel(
         mesh,
         variant.laminate(first),
         variant.rules(used),
@@ -72,7 +73,10 @@ def build_plate(deck: Deck, mesh: MeshArrays, variant: PlateVariant = REPORT_PLA
         others=tuple(other_laminates),
         laminate_numbers=laminate_numbers(deck) if other_laminates else None,
         curvature=FLAT if curved is None else curved.curvatures,
+        added_mass=point_masses(deck, len(mesh.coordinates)) if deck.has(PointMasses) else None,
     )
+    supports = node_supports(deck, plate)
+    return plate if supports is None else replace(plate, supports=supports)
 
 
 def build_projectile(deck: Deck, variant: ImpactVariant = REPORT_IMPACT) -> DeckProjectile:

@@ -31,7 +31,12 @@ from fecm.mechanics.mesh import (
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import uniform_stresses
 from fecm.mechanics.points import RADIUS_PER_THICKNESS, containing_elements, patch_weights
-from fecm.mechanics.solutions import buckling_factor
+from fecm.mechanics.solutions import (
+    SingularStiffnessError,
+    StaticResponse,
+    buckling_factor,
+    static_response,
+)
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
@@ -120,12 +125,12 @@ class Problem:
     def span(self) -> Span:
         """Distance between supports that counts for bending."""
         whole = self.symmetry.unfolded(self.mesh.coordinates[self.mesh.used])
-        return unsupported(self.mesh, self.load_place, whole)
+        return unsupported(self.plate.supported, self.load_place, whole)
 
     @cached_property
     def outside_supports(self) -> Bools:
         """Whether every element lies on a free rim outside the supports, (numel,)."""
-        return outside_supports(self.mesh, self.symmetry.nodes(self.mesh))
+        return outside_supports(self.plate.supported, self.symmetry.nodes(self.mesh))
 
     @cached_property
     def plate(self) -> PlateModel:
@@ -174,6 +179,38 @@ class Problem:
         if not moves_only(self.program):
             return self.plate
         return restrain_resting_dofs(self.plate, self.contact)
+
+    @cached_property
+    def static(self) -> StaticResponse | None:
+        """Response of the moving plate to a static unit force; None if nothing holds the plate.
+
+        Raises ConvergenceError if the plate finds no rest on its one-sided supports.
+        """
+        assert self.contact is not None  # the program has impact steps
+        try:
+            return static_response(self.moving_plate, self.contact)
+        except SingularStiffnessError:
+            return None
+
+    @cached_property
+    def knife_edges(self) -> Bools:
+        """Nodes on lines that hold w both ways, but no rotation, (numnp,).
+
+        Such a line stands for a ring, a window or a knife edge, which can only push.
+        """
+        plate, free = self.moving_plate, self.moving_plate.mesh.equations > 0
+        turns = (free | self.symmetry.held(self.mesh))[:, W + 1 :].all(axis=1)
+        held = ~free[:, W]
+        if plate.supports is not None:
+            springs = plate.supports.select(
+                ~plate.supports.is_one_sided & (plate.supports.dof == W)
+            )
+            held[springs.node] = True
+        rests = held & turns
+        on_line = np.zeros(len(rests), dtype=bool)
+        lines = self.sides.take(np.asarray(rests[self.sides.ends].all(axis=1)))
+        on_line[lines.nodes[lines.nodes >= 0]] = True
+        return on_line & rests
 
     @cached_property
     def safe_time_step(self) -> float:
@@ -289,7 +326,9 @@ class Problem:
 
         At such a node the sides of elements whose ends are held in w run in two directions.
         """
-        return inner_corners(self.families, self.mesh.coordinates, self.mesh.equations[:, W] == 0)
+        return inner_corners(
+            self.families, self.mesh.coordinates, self.plate.supported.equations[:, W] == 0
+        )
 
     def coarseness(self, elements: Indices) -> float:
         """Return the longest side of some elements over the reach of the load."""

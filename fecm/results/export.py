@@ -66,6 +66,7 @@ KEYS = {
     "members": "element",
     "npp": "point",
     "patch_nodes": "node",
+    "supports": "support",
 }
 # Datasets that number the positions along an axis.
 LABELS = {"gages": "gages/number", "members": "plies/element", "patch_nodes": "patch/node"}

@@ -272,6 +272,34 @@ class MembraneRows(
     ]
 
 
+class SupportRows(
+    Rows,
+    group="supports",
+    about="springs and one-sided supports at the nodes, and their forces at the rows of tape3",
+    macro="DISP",
+):
+    """Springs and one-sided supports at the nodes, and their forces at the rows of tape3."""
+
+    node: Annotated[Int32s, "supports", "number of the node of every support"]
+    dof: Annotated[Int32s, "supports", "its unknown, from 1: u, v, w, theta_x, theta_y"]
+    side: Annotated[
+        Int32s, "supports", "1 under the plate or -1 on the struck face; 0 for a spring"
+    ]
+    stiffness: Annotated[
+        Floats,
+        "supports",
+        "stiffness of every support",
+        "force/length (u, v, w), force*length (theta_x, theta_y)",
+    ]
+    gap: Annotated[Floats, "supports", "gap of every one-sided support", "length"]
+    push: Annotated[Floats, "rows", "sum of the forces on w against the push", "force"]
+    pull: Annotated[Floats, "rows", "sum of the forces on w along the push", "force"]
+    closed: Annotated[Ints, "rows", "number of one-sided supports that touch the plate"]
+    lift: Annotated[
+        Floats, "rows", "largest distance of the plate from a one-sided support", "length"
+    ]
+
+
 class Stresses(
     Rows,
     group="stresses",

@@ -180,8 +180,8 @@ PINNED = (
 
 
 def form_tangent(run: Simulation) -> None:
-    """Execute TANG: form the stiffness, of a nonlinear plate about its present displacement."""
-    if run.model.plate.nonlinear:
+    """Execute TANG: form the stiffness, about the present displacement unless it is constant."""
+    if not run.model.plate.is_linear:
         run.linearise(run.displacement_field())
         if run.tangent.pins and PINNED not in run.state.notes:
             run.state.notes.append(PINNED)
@@ -202,7 +202,7 @@ def solve_statics(run: Simulation) -> None:
     run.model.motion.displace(state.plate, change)
     size = float(np.linalg.norm(state.plate.displacement))
     state.converged = float(np.linalg.norm(change)) <= state.tolerance * size
-    if run.model.plate.nonlinear and not math.isfinite(size):
+    if not run.model.plate.is_linear and not math.isfinite(size):
         raise ConvergenceError(_not_in_equilibrium(run, "the displacement is no longer finite"))
 
 
@@ -211,7 +211,7 @@ def leave_if_converged(run: Simulation) -> bool:
     state = run.state
     if state.converged:
         state.equilibrium_factor = run.force_factor()
-    elif run.model.plate.nonlinear and not run.interpreter.passes_to_come:
+    elif not run.model.plate.is_linear and not run.interpreter.passes_to_come:
         passes = run.interpreter.current_pass
         raise ConvergenceError(_not_in_equilibrium(run, f"no equilibrium after {passes} passes"))
     return state.converged
@@ -237,9 +237,9 @@ def set_tolerance(run: Simulation, tolerance: float) -> None:
 
 
 def find_modes(run: Simulation, n: int) -> None:
-    """Execute EIGE: find the lowest modes, of a nonlinear plate about its present displacement."""
+    """Execute EIGE: find the lowest modes, of small motions about the present displacement."""
     state, plate = run.state, run.model.plate
-    about = run.displacement_field() if plate.nonlinear else None
+    about = None if plate.is_linear else run.displacement_field()
     natural_modes = modes(plate, n, consistent=state.consistent_mass, field=about)
     pairs = zip(natural_modes.angular_frequency, natural_modes.shapes, strict=True)
     for mode, (omega, shape) in enumerate(pairs, start=1):
@@ -257,6 +257,7 @@ def _at_passes(word: str, run: Simulation, n: int, _: float = 0.0) -> None:
 
 def _store_displacements(run: Simulation, steps: Steps, times: Times, fields: Floats) -> None:
     run.recorder.rows("tape3", steps, times, {"w": fields[:, :, 2], "displacement": fields})
+    run.recorder.supports(steps, times, fields)
     if run.state.impact is None:
         run.recorder.stretching(steps, times, fields)
         for time, field in zip(times, fields, strict=True):

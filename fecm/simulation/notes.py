@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecm._typing import Array, Floats
-from fecm.deck.model import Gages, Indentation
+from fecm.deck.model import Gages, Impact, Indentation
 from fecm.deck.units import MODULUS, in_si, quantity, unit_of
 from fecm.judge.criteria import spelt, yield_stress
 from fecm.judge.end import DECIDING_STEPS, ENDS, End
@@ -39,9 +39,11 @@ from fecm.judge.limits import (
 from fecm.judge.validity import joined, of_face, unsafe
 from fecm.mechanics.mesh import rigid_deflections
 from fecm.mechanics.points import shortest_side
-from fecm.mechanics.solutions import static_support
+from fecm.mechanics.quick_models import static_peak
+from fecm.mechanics.solutions import pull_of_supports
 from fecm.problem.contact_estimates import mean_pressure
-from fecm.problem.estimates import MOST_SOLVED
+from fecm.problem.estimates import MOST_SOLVED, pushing_compliance
+from fecm.problem.problem import Problem
 from fecm.results.exposures import count_evaluations, largest_exposures
 from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
@@ -106,7 +108,7 @@ def _deflections(simulation: Simulation, result: Result) -> Iterator[RunPeak]:
     DISP stores all nodes; every step stores the deflection under the load.
     """
     problem = simulation.problem
-    free = rigid_deflections(problem.mesh)
+    free = rigid_deflections(problem.plate.supported)
     root = np.ones(1)
     if free.size and problem.symmetry.factor > 1:  # the least squares of the whole plate
         root = np.sqrt(problem.symmetry.images(problem.mesh))
@@ -346,15 +348,36 @@ def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
     contact, force = problem.contact, result["history/force"]
     if contact is None or not force.any() or problem.deck.control.numel > MOST_SOLVED:
         return
-    held = problem.symmetry.held(problem.mesh)
-    support = static_support(problem.moving_plate, contact, held)
-    if support is None:
+    if not problem.knife_edges.any() or (response := problem.static) is None:
         return
-    stiffness, pull = support
+    forces = pull_of_supports(problem.moving_plate, response, contact)
+    pull = float(forces[problem.knife_edges].sum())
     peak = int(force.argmax())
     w = result["history/plate_w"][peak] - start_w_of(result)
-    if pull > PULL.value and w * stiffness > STATIC * force[peak]:
-        yield PULL.say(pull=pull)
+    if pull > PULL.value and w > STATIC * force[peak] * response.compliance:
+        band = _band_without_pull(problem, result, response.compliance)
+        yield PULL.say(pull=pull, band=band, remedy=simulation.model.variant.is_report)
+
+
+def _band_without_pull(problem: Problem, result: Result, held: float) -> str:
+    """Say how much softer a plate is whose supports only push, and what that does to the peak.
+
+    The peaks of both are those of the impact on the static plate, which share the run's peak.
+    `held` is the compliance of the plate whose supports pull as well.
+    """
+    pushed = pushing_compliance(problem)
+    if math.isnan(pushed):
+        return "without clamps the plate tips off them"
+    softer = f"the plate is then {pushed / held - 1.0:.1%} more flexible"
+    factor, k = problem.symmetry.factor, problem.contact_coefficient
+    mass, velocity = problem.projectile_mass, problem.deck.require(Impact).velocity
+    first, second = (
+        static_peak(mass, velocity, k, factor / compliance) for compliance in (held, pushed)
+    )
+    peak = float(result["history/force"].max()) * factor
+    unit = unit_of("force", result.units)
+    low, high = quantity(peak * second / first, unit), quantity(peak, unit)
+    return f"{softer}, and the peak force lies between {low} and {high}"
 
 
 def _gravity(simulation: Simulation, result: Result) -> Iterator[str]:
@@ -455,7 +478,7 @@ def _beyond(simulation: Simulation, result: Result) -> Iterator[Beyond]:
         strain = largest_strain(simulation, result)
         indentation = largest_indentation(simulation, result)
     h, indented = judge.thickness, judge.indented
-    is_free = rigid_deflections(simulation.problem.mesh).size > 0
+    is_free = rigid_deflections(simulation.problem.plate.supported).size > 0
     yield from beyond(
         judge.deflection,
         deflection,

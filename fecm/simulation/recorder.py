@@ -255,6 +255,7 @@ class StepRecorder:
 Steps = Sequence[int]  # of rows
 Times = Sequence[float]
 MEMBRANE = "membrane"
+SUPPORTS = "supports"
 LAMINATE = "laminate"
 MATERIAL = "plies/material"
 BY_PASS = {name: info.macro for name, info in GROUPS.items() if info.by_pass}
@@ -361,6 +362,7 @@ class Recorder:
         if model.stretching is not None:
             rows = sizes.contact_rows if has_impact else sizes.passes["DISP"]
             self._room[MEMBRANE] = rows
+        self._room[SUPPORTS] = 0 if model.supports is None else sizes.passes["DISP"]
         absent = _absent(model)
         self._datasets = [
             (dataset, self._shape(dataset))
@@ -370,7 +372,7 @@ class Recorder:
             for dataset in _of_laminates(kind, model)
         ]
         self._buffers: dict[str, RowBuffer] = {}
-        for group in (*EVERY_STEP, "tape8", "tape9", "exposures", *BY_PASS, MEMBRANE):
+        for group in (*EVERY_STEP, "tape8", "tape9", "exposures", *BY_PASS, MEMBRANE, SUPPORTS):
             members = [p for p in self._datasets if p[0].group == group and p[0].shape[0] == "rows"]
             if members:
                 self._buffers[group] = RowBuffer(sink, members)
@@ -399,6 +401,8 @@ class Recorder:
         if self._model.failure is not None:
             _, numbers["npp"], _ = self._model.failure.stresses.shape
             numbers["interfaces"] = numbers["layers"] - 1
+        if self._model.supports is not None:
+            numbers["supports"] = len(self._model.supports.supports.node)
         if self._model.patch is not None:
             numbers["patch_nodes"] = np.count_nonzero(self._model.patch.weights)
         return tuple(numbers[n] if isinstance(n, str) else n for n in dataset.shape)
@@ -458,6 +462,11 @@ class Recorder:
             (nodes,) = np.nonzero(patch.weights)
             datasets["patch/node"] = nodes + 1
             datasets["patch/weight"] = patch.weights[nodes]
+        if self._room[SUPPORTS] and model.supports is not None:
+            supports = model.supports.supports
+            numbers = {"node": supports.node + 1, "dof": supports.dof + 1}
+            values = {n: getattr(supports, n) for n in ("side", "stiffness", "gap")}
+            datasets |= {f"{SUPPORTS}/{n}": value for n, value in {**numbers, **values}.items()}
         near = model.under_load
         if near is not None and self._room["plies"] and model.plies is not None:
             members = model.plies.members
@@ -495,6 +504,12 @@ class Recorder:
         strains = self._model.strains.evaluate(fields)
         self.rows("tape8", steps, times, dict(zip(STRAINS, strains, strict=True)))
         self.stretching(steps, times, fields)
+
+    def supports(self, steps: Steps, times: Times, fields: Floats) -> None:
+        """Store rows about springs and one-sided supports, from displacements at `times`."""
+        if self._model.supports is not None:
+            for step, time, field in zip(steps, times, fields, strict=True):
+                self.row(SUPPORTS, step, time, self._model.supports.evaluate(field)._asdict())
 
     def stretching(self, steps: Steps, times: Times, fields: Floats) -> None:
         """Store rows about the midplane of a nonlinear plate, from displacements at `times`."""

@@ -18,7 +18,6 @@ from fecm._machine import require_memory
 from fecm._typing import Floats
 from fecm.authoring.time_values import lengthened
 from fecm.deck.macros import flat
-from fecm.deck.model import Nonlinear
 from fecm.judge.limits import ENERGY_BALANCE
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import HystereticLaw, Law
@@ -69,7 +68,7 @@ def only_impacts(checked: Problem, names: Collection[str] = ()) -> bool:
 
 def shares_plate(checked: Problem, names: Collection[str] = ()) -> bool:
     """Return whether cases of a linear plate share a response: see :func:`only_impacts`."""
-    return not checked.deck.has(Nonlinear) and only_impacts(checked, names)
+    return checked.deck.is_linear and only_impacts(checked, names)
 
 
 @dataclass

@@ -175,6 +175,8 @@ class ReducedRuns(SharedPlate):
             )
         if REFINE in names or "dt" in names:
             return "the reduced model has a time step of its own: dt and refine can't vary"
+        if checked.plate.lifts:
+            return "the reduced model has no one-sided supports (UNIL): leave it out"
         if not checked.deck.has(Nonlinear):
             return "the reduced model is for decks with NONL; cases of others share a run"
         if not only_impacts(checked):
@@ -226,7 +228,7 @@ class InFull(Method):
         cases, design, texts = definition.cases, definition.design, []
         if design is not None:
             texts.append(cost_of_runs(cases, design, self.shared))
-        if definition.settings.build is None and checked.plate.nonlinear:
+        if definition.settings.build is None and not checked.plate.is_linear:
             texts.append(expected(checked, definition, workers))
         return texts
 
@@ -250,7 +252,7 @@ class SharedMotion(InFull):
     def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
         """Return whether cases of a deck are run in full, each once and without a function."""
         obstacles = settings.build, settings.measure, settings.search
-        in_full = settings.has_exposures or checked.deck.has(Nonlinear)
+        in_full = settings.has_exposures or not checked.deck.is_linear
         return in_full and all(other is None for other in obstacles)
 
     def most_cases(self, definition: Plan) -> int:

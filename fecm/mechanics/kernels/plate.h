@@ -22,7 +22,8 @@
  *
  * Sums.  In matrix products a register sums over the columns in ascending order.  `update` sums each energy over
  * all dofs in two registers of four lanes, for even and odd fours of nodes.  A chunk returns their sum,
- * (4 energies, 4 lanes).  The fifth sum is the work of the blocks of a nonlinear plate.  Only the layout fixes
+ * (4 energies, 4 lanes).  The fifth sum is the work of the blocks of a nonlinear plate, and of supports with
+ * gaps.  Only the layout fixes
  * the order of all sums.
  *
  * Threads.  run_chunk writes the entries of its chunk, its `force`, its `sums` and the buffer of its thread.  It
@@ -459,6 +460,18 @@ INLINE void NAME(update)(int nd, const Plate *p, const Chunk *c, double *force, 
     const double *const mass = p->mass + p->planes * c->first, *const inverse = p->inverse + p->planes * c->first;
     double *const u = p->u + nd * c->first, *const d = p->d + nd * c->first, *const s = p->s + nd * c->first;
     const half zero = {0};
+    for (int64_t i = 0; i < c->supports; i++) {
+        const Support *k = c->support + i;
+        if (!k->side) {
+            force[k->at] += k->stiffness * u[k->at];
+            continue;
+        }
+        const double depth = k->side * u[k->at] - k->gap;
+        if (depth > 0.0) {
+            force[k->at] += k->side * k->stiffness * depth;
+            sums[4][0] += k->stiffness * k->gap * depth;
+        }
+    }
     for (int64_t i = 0; i < c->fixed; i++) force[c->at_rest[i]] = 0.0;
     if (!p->rate) {
         memcpy(s, force, sizeof(double) * nd * n);

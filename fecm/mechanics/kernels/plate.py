@@ -55,13 +55,14 @@ from ctypes import POINTER, c_double, c_int64
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._typing import Array, Floats
+from fecm._typing import Array, Bools, Floats
 from fecm.mechanics.interpolation import NDOF
 from fecm.mechanics.kernels import LIBRARY, Doubles, Integers, Structure, floats
 from fecm.mechanics.kernels.element_groups import ElementGroup, GroupStruct, grouped
 from fecm.mechanics.kernels.layout import Indices, Layout, NodePlaces, kernel_layout, places_of
 from fecm.mechanics.plate import PlateModel, R, StiffnessOperator, pieces
 from fecm.mechanics.strains import strain_of_deflection
+from fecm.mechanics.supports import NodeSupports
 from fecm.mechanics.symmetry import TURNED, SymmetryReduction
 
 # Relative difference below which ratios of masses count as equal.
@@ -81,6 +82,17 @@ class BlockStruct(Structure):
 
 # BlockStruct as the type of an array: the blocks of a group are filled together.
 BLOCK = np.dtype([(name, np.uint64) for name, _ in BlockStruct._fields_])
+
+
+class SupportStruct(Structure):
+    """A spring or a one-sided support of a dof; see :mod:`~fecm.mechanics.supports`."""
+
+    _fields_ = (
+        ("at", c_int64),  # entry of the dof in its chunk
+        ("side", c_double),  # 0 for a spring
+        ("stiffness", c_double),
+        ("gap", c_double),
+    )
 
 
 class ChunkStruct(Structure):
@@ -109,6 +121,8 @@ class ChunkStruct(Structure):
         ("at_rest", Integers),
         ("signs", Doubles),
         ("force", Doubles),
+        ("supports", c_int64),
+        ("support", POINTER(SupportStruct)),
     )
 
 
@@ -220,6 +234,8 @@ class CompiledPlate:
         cuts = self._chunks(parts, places, leader)
         curved = plate.is_curved and not nonlinear
         lanes = self._blocks(cuts, layout, groups, places)
+        if plate.supports is not None:
+            self._support(cuts, plate.supports, places, leader, moves)
         self.structure = PlateStruct(
             nd=nd,
             chunks=layout.chunks,
@@ -270,6 +286,30 @@ class CompiledPlate:
             self._held.append(structure)
             cuts[number] = structure
         return cuts
+
+    def _support(
+        self,
+        cuts: ctypes.Array[ChunkStruct],
+        supports: NodeSupports,
+        places: NodePlaces,
+        leader: Indices,
+        moves: Bools,
+    ) -> None:
+        """Add the supports of moving dofs to the chunks of their nodes."""
+        rows = supports.select(moves[supports.node, supports.dof])
+        nodes = leader[rows.node]
+        chunk, place = (part[nodes] for part in places.home)
+        dof = rows.dof - self.columns[0]
+        for number in np.unique(chunk).tolist():
+            here = np.flatnonzero(chunk == number)
+            table = (SupportStruct * len(here))()
+            for entry, row in zip(table, here.tolist(), strict=True):
+                entry.at = int(dof[row] * cuts[number].nodes + place[row])
+                entry.side, entry.stiffness = rows.side[row], rows.stiffness[row]
+                entry.gap = rows.gap[row]
+            self._held.append(table)
+            cuts[number].supports = len(here)
+            cuts[number].support = table
 
     def _blocks(
         self,

@@ -50,6 +50,12 @@ typedef struct {
     const double *membrane; /* nonlinear plate: (16, 8) for parallelograms, (56, 8) for others, (59, 8) if curved */
 } Block;
 
+/* Spring or one-sided support of the entry `at` of a chunk; `side` is 0 for a spring.  See supports.py. */
+typedef struct {
+    int64_t at;
+    double side, stiffness, gap;
+} Support;
+
 /* Blocks of near elements.  The last chunk has no blocks; it has the nodes that chunks share. */
 typedef struct {
     int64_t blocks;
@@ -60,6 +66,8 @@ typedef struct {
     const int32_t *at_rest;         /* (fixed,): entries without a mass */
     const double *signs;            /* (shared, nd) */
     double *force;                  /* (shared, nd) */
+    int64_t supports;
+    const Support *support;         /* (supports,) of the chunk's own nodes */
 } Chunk;
 
 typedef struct {

@@ -25,6 +25,9 @@ LATER_SEGMENTS = (
     model.Materials,
     model.Laminates,
     model.Zones,
+    model.Springs,
+    model.OneSidedSupports,
+    model.PointMasses,
 )
 
 

@@ -249,7 +249,7 @@ def too_few_supports(problem: Problem) -> Reports:
 
     Remedy: Restrain every node of a supported edge. A free plate needs no support.
     """
-    held = problem.mesh.equations == 0
+    held = problem.plate.supported.equations == 0
     count = int(held[:, W].sum())
     if 0 < count <= FEW_SUPPORTS and held[:, THETA_X:].any(axis=1).sum() <= FEW_SUPPORTS:
         segment = problem.deck.last(model.Boundary)

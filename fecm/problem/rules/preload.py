@@ -150,7 +150,7 @@ def compressed_free_plate(problem: Problem, card: model.Preload) -> Reports:
 
     Remedy: Restrain w at the edges, or a preload in tension.
     """
-    if problem.plate.is_compressed and rigid_deflections(problem.mesh).size:
+    if problem.plate.is_compressed and rigid_deflections(problem.plate.supported).size:
         message = "PREL compresses a plate that its supports let move along w."
         yield Report(message, card.place(), "restrain w at every node of a supported edge")
 

@@ -1,0 +1,129 @@
+"""Springs and one-sided supports at nodes.
+
+A spring to ground has the force -k u on its dof, and the energy k u^2/2.  A one-sided support acts
+on w: with the side s and the gap g its force is
+
+    -s r,  r = k max(0, s w - g),
+
+and its energy k max(0, s w - g)^2/2.  w is positive along the push, so that a support under the
+plate, on the face away from the projectile, has s = 1, and the tip of a clamp on the struck face
+has s = -1.  A support is closed if s w >= g.
+
+The energy of a spring is half the product of u and its force.  With a gap the product is larger by
+r g, the excess work; the quadratic strains of a nonlinear plate have one too (see membrane.py).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fecm._typing import Bools, Floats, Indices
+from fecm.mechanics.interpolation import W
+
+
+class NodeSupports(NamedTuple):
+    """Springs and one-sided supports, (n,) each.
+
+    Attributes
+    ----------
+    node, dof : ndarray of int (n,)
+        Node and dof, from 0.
+    side : ndarray (n,)
+        1 or -1 for a one-sided support; 0 for a spring, which pushes and pulls.
+    stiffness : ndarray (n,)
+        Force/length; force*length for rotations.
+    gap : ndarray (n,)
+        Gap of a one-sided support, length.
+    """
+
+    node: Indices
+    dof: Indices
+    side: Floats
+    stiffness: Floats
+    gap: Floats
+
+    @property
+    def is_one_sided(self) -> Bools:
+        """Whether each support is one-sided, (n,)."""
+        return np.asarray(self.side != 0.0)
+
+    def select(self, rows: Bools) -> NodeSupports:
+        """Return the supports of a mask, (n,)."""
+        node, dof, side, stiffness, gap = self
+        return NodeSupports(node[rows], dof[rows], side[rows], stiffness[rows], gap[rows])
+
+    def held(self) -> NodeSupports:
+        """Return the supports as springs: all one-sided supports are closed."""
+        return self._replace(side=np.zeros_like(self.side), gap=np.zeros_like(self.gap))
+
+    def without_gaps(self) -> NodeSupports:
+        """Return the supports without their gaps."""
+        return self._replace(gap=np.zeros_like(self.gap))
+
+    def joined(self, other: NodeSupports) -> NodeSupports:
+        """Return these supports and others."""
+        return NodeSupports(
+            np.concatenate([self.node, other.node]),
+            np.concatenate([self.dof, other.dof]),
+            np.concatenate([self.side, other.side]),
+            np.concatenate([self.stiffness, other.stiffness]),
+            np.concatenate([self.gap, other.gap]),
+        )
+
+    def of(self, field: Floats) -> Floats:
+        """Return the displacement of each support's dof, (n,), in a field, (numnp, 5)."""
+        return np.asarray(field[self.node, self.dof])
+
+    def closed(self, displacement: Floats) -> Bools:
+        """Return whether each support is closed at displacements of the dofs, (n,)."""
+        return np.asarray(~self.is_one_sided | (self.side * displacement >= self.gap))
+
+    def reactions(self, displacement: Floats) -> Floats:
+        """Return the internal force of each support, (n,), at displacements of the dofs, (n,).
+
+        The support acts on the plate with the opposite force.
+        """
+        depth = np.maximum(self.side * displacement - self.gap, 0.0)
+        return np.asarray(
+            self.stiffness * np.where(self.is_one_sided, self.side * depth, displacement)
+        )
+
+    def excess_work(self, displacement: Floats) -> float:
+        """Return the product of displacements and forces minus twice the energy."""
+        depth = np.maximum(self.side * displacement - self.gap, 0.0)
+        return float((self.stiffness * self.gap * depth).sum())
+
+    def forces(self, field: Floats) -> Floats:
+        """Return the internal forces of all dofs, (numnp, 5), in a displacement field."""
+        return self.summed(self.reactions(self.of(field)), len(field))
+
+    def diagonal(self, rows: Bools, numnp: int) -> Floats:
+        """Return the stiffness of all dofs, (numnp, 5), of the supports of a mask, (n,)."""
+        return self.summed(np.where(rows, self.stiffness, 0.0), numnp)
+
+    def summed(self, values: Floats, numnp: int) -> Floats:
+        """Sum values of the supports, (n,), over the dofs of the nodes, (numnp, 5)."""
+        total = np.zeros((numnp, 5))
+        np.add.at(total, (self.node, self.dof), values)
+        return total
+
+    def is_invariant(self, images: Indices) -> bool:
+        """Return whether a half turn maps the supports onto themselves.
+
+        `images` (numnp,) are the images of the nodes. w keeps its sign, and so do the sides.
+        """
+        order = np.lexsort((self.gap, self.stiffness, self.side, self.dof, self.node))
+        turned = self._replace(node=images[self.node])
+        image_order = np.lexsort(
+            (turned.gap, turned.stiffness, turned.side, turned.dof, turned.node)
+        )
+        return all(
+            np.array_equal(a[order], b[image_order]) for a, b in zip(self, turned, strict=True)
+        )
+
+
+def one_sided(node: Indices, side: Floats, stiffness: Floats, gap: Floats) -> NodeSupports:
+    """Return one-sided supports of w at nodes, from 0."""
+    return NodeSupports(node, np.full(len(node), W), side, stiffness, gap)

@@ -1,0 +1,422 @@
+"""Springs, one-sided supports and point masses, against other programs and closed forms.
+
+liftoff_static.csv, liftoff_impact_summary.csv and elastic_edges.csv are the results of programs
+with p-elements that share no code with fecm. The plates of the first two lie on the window of ASTM
+D7136, 125 x 75 in a plate of 150 x 100; the third has springs along all edges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm import Result
+from fecm.deck import model
+from fecm.deck.model import (
+    Deck,
+    NodeValues,
+    OneSidedSupport,
+    OneSidedSupports,
+    PointMasses,
+    Springs,
+)
+from fecm.mechanics.solutions import modes, static_response
+from fecm.mechanics.stiffness_product import internal_force_operator
+from fecm.mechanics.supports import NodeSupports
+from fecm.mechanics.symmetry import symmetry_reduction, unreduced, with_codes
+from fecm.mechanics.time_step import critical_time_step, safe_time_step
+from fecm.problem.loading import load_deck
+from fecm.problem.problem import Problem
+from tests.builders import Floats, table
+
+SIZE = 150.0, 100.0
+STATIC_PLY = fecm.Ply(1.57e-9, 0.32, 161000.0, 11380.0, 5170.0, 5170.0, 3980.0)
+PLY = fecm.Ply(1.57e-9, 0.32, 171420.0, 9080.0, 5290.0, 5290.0, 3242.86)
+LAYUPS = {
+    "QI24": ("[45/0/-45/90]3s", 4.4 / 24),
+    "QI16": ("[45/0/-45/90]2s", 2.93 / 16),
+    "CP24": ("[0/90]6s", 4.4 / 24),
+}
+FINE, COARSE = (60, 40), (24, 16)
+
+
+def free_plate(mesh: tuple[int, int] = COARSE, layup: str = "QI24", **options: Any) -> Deck:
+    """A plate of D7136 without supports, hit by 5.5 kg."""
+    text, thickness = LAYUPS[layup]
+    given: dict[str, Any] = {"shear_factor": 1.0, "velocity": 2696.8, "duration": 4e-3}
+    return fecm.impact(
+        fecm.Plate.rectangle(SIZE, mesh),
+        fecm.Laminate(text, options.pop("ply", PLY), thickness),
+        fecm.RigidMass(5.5e-3),
+        model.Indentation(42090.3, 1e6, 0.1, 1.5),
+        units="mm-N-s",
+        patch="disc",
+        kinematics="linear",
+        **{**given, **options},
+    )
+
+
+def with_segments(deck: Deck, *segments: model.Segment) -> Deck:
+    """The deck with more segments."""
+    return replace(deck, segments=(*deck.segments, *segments), text="")
+
+
+def window_lines(mesh: tuple[int, int]) -> list[tuple[int, int]]:
+    """Nodes at the ends of the sides of the window, which lie on sides of elements."""
+    columns = 2 * mesh[0] + 1
+    x, y = (round(12.5 / SIZE[0] * 2 * mesh[0]), round(12.5 / SIZE[1] * 2 * mesh[1]))
+    left, right, low, high = x, 2 * mesh[0] - x, y, 2 * mesh[1] - y
+    corners = [(left, low), (right, low), (right, high), (left, high)]
+    numbers = [column + row * columns + 1 for column, row in corners]
+    return list(zip(numbers, [*numbers[1:], numbers[0]], strict=True))
+
+
+def pushing(mesh: tuple[int, int] = COARSE, stiffness: float = 0.0, gap: float = 0.0) -> Any:
+    """The window that only pushes."""
+    lines = [OneSidedSupport(a, b, 1, stiffness, gap) for a, b in window_lines(mesh)]
+    return OneSidedSupports(tuple(lines), word="LINE")
+
+
+def pulling_too(mesh: tuple[int, int] = COARSE, stiffness: float = 1e4) -> Springs:
+    """The window that pushes and pulls."""
+    values = (0.0, 0.0, stiffness, 0.0, 0.0)
+    return Springs(tuple(NodeValues(a, b, values) for a, b in window_lines(mesh)), word="LINE")
+
+
+def problem_of(deck: Deck) -> Problem:
+    """The checked problem of a deck."""
+    (problem,) = load_deck(deck).problems
+    return problem
+
+
+def run(deck: Deck, **options: Any) -> Result:
+    """The result of a run."""
+    result = fecm.run(deck, **options)
+    assert isinstance(result, Result)
+    return result
+
+
+def held_window(problem: Problem) -> tuple[Floats, float]:
+    """The forces of a held window and the compliance under a static unit load."""
+    plate, contact = problem.moving_plate, problem.contact
+    assert plate.supports is not None
+    assert contact is not None
+    codes = plate.mesh.codes.copy()
+    codes[plate.supports.node, 2] = 1
+    held = replace(with_codes(plate, codes), supports=None)
+    response = static_response(held, contact)
+    forces = held.internal_forces(response.field)[plate.supports.node, 2]
+    return forces, response.compliance
+
+
+# Statics -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("mesh", "tolerance", "error"),
+    [(COARSE, 0.006, 0.03), pytest.param(FINE, 0.003, 0.005, marks=pytest.mark.long)],
+)
+@pytest.mark.parametrize("layup", LAYUPS)
+def test_a_window_that_only_pushes_is_as_flexible_as_in_another_program(
+    layup: str, mesh: tuple[int, int], tolerance: float, error: float
+) -> None:
+    rows = [row for row in table("liftoff_static.csv") if row["layup"] == layup]
+    both_ways, only_pushing = (float(row["flexibility_mm_per_N"]) for row in rows[:2])
+    deck = free_plate(mesh, layup, ply=STATIC_PLY, shear_factor=5.0 / 6.0)
+    problem = problem_of(with_segments(deck, pushing(mesh)))
+    assert problem.static is not None
+    forces, compliance = held_window(problem)
+    ratio = problem.static.compliance / compliance
+    assert ratio == pytest.approx(only_pushing / both_ways, abs=tolerance)
+    pull = forces[forces > 0.0].sum()
+    assert pull == pytest.approx(float(rows[0]["pull_of_support_per_N"]), abs=error)
+    assert problem.static.gain < 0.002
+
+
+def test_stiff_springs_are_restraints_and_supports_that_stay_closed_are_springs() -> None:
+    problem = problem_of(with_segments(free_plate(), pulling_too(stiffness=1e12)))
+    assert problem.static is not None
+    _, compliance = held_window(problem)
+    assert problem.static.compliance == pytest.approx(compliance, rel=1e-6)
+    plate, contact = problem.moving_plate, problem.contact
+    assert plate.supports is not None
+    assert contact is not None
+    # A load on the whole window closes every support of the window.
+    soft = replace(
+        plate, supports=plate.supports._replace(stiffness=0.0 * plate.supports.gap + 1.0)
+    )
+    assert soft.supports is not None
+    over_window = np.zeros_like(contact)
+    over_window[soft.supports.node, 2] = 1.0 / len(soft.supports.node)
+    one_sided = replace(soft, supports=soft.supports._replace(side=soft.supports.gap + 1.0))
+    assert static_response(one_sided, over_window).compliance == pytest.approx(
+        static_response(soft, over_window).compliance, rel=1e-12
+    )
+
+
+def test_a_plate_on_supports_under_one_half_tips_off() -> None:
+    (first, second), *_ = window_lines(COARSE)
+    rows = [OneSidedSupport(node, 0, 1) for node in (first, second)]
+    loaded = load_deck(with_segments(free_plate(), OneSidedSupports(tuple(rows))))
+    assert "E579" in {finding.code for finding in loaded.errors()}
+
+
+# Steps -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", ["numpy", "csr", "kernels"])
+@pytest.mark.parametrize("gap", [0.0, 2e-3])
+def test_every_product_has_the_forces_and_the_energy_of_the_supports(
+    solver: str, gap: float
+) -> None:
+    deck = with_segments(
+        free_plate((12, 8)), pushing((12, 8), 1e4, gap), pulling_too((12, 8), 20.0)
+    )
+    plate = problem_of(deck).moving_plate
+    supports = plate.supports
+    assert supports is not None
+    reduction = symmetry_reduction(plate, problem_of(deck).contact)
+    q = 1e-2 * np.random.default_rng(3).standard_normal(reduction.count)
+    if solver == "csr":
+        q = reduction.field(q)[plate.mesh.equations > 0]
+        reduction = unreduced(plate)
+    bare = replace(plate, supports=None)
+    product, without = (internal_force_operator(p, solver, reduction) for p in (plate, bare))
+    added = product(q) - without(q)
+    w = reduction.field(q)[:, 2]
+    expected = np.zeros(reduction.sign.shape)
+    excess = energy = 0.0
+    for node, side, k, g in zip(
+        supports.node.tolist(),
+        supports.side.tolist(),
+        supports.stiffness.tolist(),
+        supports.gap.tolist(),
+        strict=True,
+    ):
+        depth = w[node] if side == 0.0 else max(0.0, side * w[node] - g)
+        expected[node, 2] += k * depth if side == 0.0 else side * k * depth
+        excess += k * g * depth
+        energy += 0.5 * k * depth**2
+    scale = np.abs(product(q)).max()
+    assert np.abs(added - reduction.gather(expected)).max() < 1e-12 * scale
+    assert product.quadratic_work == pytest.approx(excess, rel=1e-12)
+    work = float(q @ added)
+    assert 0.5 * (work - excess) == pytest.approx(energy, rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["numpy", "csr"])
+def test_the_kernels_take_the_steps_of_numpy(solver: str) -> None:
+    deck = with_segments(
+        free_plate((12, 8), duration=1e-4), pushing((12, 8), gap=1e-3), pulling_too((12, 8), 20.0)
+    )
+    first, second = run(deck), run(deck, solver=solver)
+    for path in ("history/force", "energy/plate_strain", "supports/push", "supports/lift"):
+        scale = np.abs(first[path]).max()
+        assert scale > 0.0
+        assert np.abs(first[path] - second[path]).max() < 1e-9 * scale
+    assert np.abs(first["energy/balance_error"]).max() < 1e-6 * first.energy.attributes["initial"]
+
+
+def test_any_number_of_threads_and_a_resumed_run_have_the_same_bytes(tmp_path: Path) -> None:
+    deck = with_segments(free_plate(duration=1e-4), pushing(gap=1e-3))
+    names = [tmp_path / f"{n}.h5" for n in ("one", "two")]
+    for threads, name in enumerate(names, start=1):
+        fecm.run(deck, output=name, threads=threads)
+    first, second = (name.read_bytes() for name in names)
+    assert first == second
+
+
+@cache
+def impact_on_window(kind: str, mesh: tuple[int, int]) -> Result:
+    """An impact of 20 J on a window of 10^4 N/mm per mm."""
+    segment = {"both ways": pulling_too(mesh), "push only": pushing(mesh, 1e4)}[kind]
+    return run(with_segments(free_plate(mesh), segment))
+
+
+@pytest.mark.parametrize("row", table("liftoff_impact_summary.csv"), ids=lambda row: row["support"])
+@pytest.mark.long
+def test_an_impact_on_an_elastic_window_is_the_one_of_another_program(row: dict[str, str]) -> None:
+    result = impact_on_window(row["support"], FINE)
+    force, w = result.history.force, result.history.plate_w
+    assert force.max() == pytest.approx(float(row["peak_N"]), rel=5e-3)
+    assert w.max() == pytest.approx(float(row["w_mm"]), rel=3e-3)
+    end = result.history.time[np.flatnonzero(force)[-1]]
+    assert end == pytest.approx(float(row["end_s"]), rel=5e-3)
+    pull, lift = -float(row["largest_pull_N"]), -float(row["largest_lift_mm"])
+    if row["support"] == "push only":
+        assert (result["supports/pull"] == 0.0).all()
+        assert result["supports/lift"].max() == pytest.approx(lift, rel=0.02)
+    else:
+        assert result["supports/pull"].max() == pytest.approx(pull, rel=0.02)
+    assert np.abs(result["energy/balance_error"]).max() < 1e-6 * result.energy.attributes["initial"]
+
+
+def test_force_and_deflection_scale_with_the_velocity_on_supports_without_gaps() -> None:
+    slow = free_plate((12, 8), duration=2e-4)
+    law = slow.require(model.Indentation)
+    fast = replace(
+        slow,
+        segments=tuple(
+            replace(s, velocity=4.0 * s.velocity)
+            if isinstance(s, model.Impact)
+            else replace(law, k=law.k / 2.0)  # k a^1.5 with 4 a is 4 times the force
+            if isinstance(s, model.Indentation)
+            else s
+            for s in slow.segments
+        ),
+        text="",
+    )
+    first, second = (run(with_segments(deck, pushing((12, 8)))) for deck in (slow, fast))
+    assert np.abs(4.0 * first.history.force - second.history.force).max() < 1e-9 * np.max(
+        second.history.force
+    )
+
+
+# Time step ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_safe_step_with_supports_is_below_the_critical_one(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    plate = problem_of(free_plate((6, 4))).moving_plate
+    alone = critical_time_step(plate)
+    nodes = random.choice(len(plate.mesh.coordinates), 12, replace=False)
+    dofs = random.integers(2, 5, 12)
+    mass = plate.field(plate.mass, 0.0)[nodes, dofs]
+    shares = 10.0 ** random.uniform(-3, 1, 12)
+    supports = NodeSupports(
+        nodes, dofs, np.where(dofs == 2, 1.0, 0.0), shares * 4.0 * mass / alone**2, np.zeros(12)
+    )
+    held = replace(plate, supports=supports)
+    step = critical_time_step(held)
+    bound = alone / np.sqrt(1.0 + shares.max())
+    assert bound * (1.0 - 1e-4) <= step <= alone * (1.0 + 1e-4)
+    assert safe_time_step(held) <= step * (1.0 + 1e-4)
+
+
+def test_the_default_stiffness_takes_little_of_the_step() -> None:
+    supported = problem_of(with_segments(free_plate(), pushing()))
+    alone = problem_of(free_plate())
+    assert 0.97 * alone.critical_time_step <= supported.critical_time_step
+    assert supported.safe_time_step == pytest.approx(
+        alone.safe_time_step / np.sqrt(1.05), rel=1e-12
+    )
+
+
+# Frequencies -------------------------------------------------------------------------------------
+
+EDGES = table("elastic_edges.csv")
+
+
+@pytest.mark.parametrize(
+    ("mesh", "of_frequencies", "of_flexibility"),
+    [
+        ((24, 16), 3e-3, 6e-3),
+        pytest.param((48, 32), 5e-4, 1e-3, marks=pytest.mark.long),
+    ],
+)
+@pytest.mark.parametrize(
+    "row", EDGES, ids=lambda row: f"{row['k_r_Nmm_per_rad_mm']}, {row['k_w_N_per_mm2']}"
+)
+@pytest.mark.few(2)
+def test_a_plate_on_elastic_edges_has_the_frequencies_of_another_program(
+    row: dict[str, str], mesh: tuple[int, int], of_frequencies: float, of_flexibility: float
+) -> None:
+    k_r, k_w = float(row["k_r_Nmm_per_rad_mm"]), float(row["k_w_N_per_mm2"])
+    deck = fecm.impact(
+        fecm.Plate.rectangle((300.0, 200.0), mesh),
+        fecm.Laminate("[0/90/0/90/0]s", PLY, 0.2),
+        fecm.RigidMass(1e-3),
+        model.Indentation(5e4, 1e6, 0.1, 1.5),
+        units="mm-N-s",
+        patch="disc:4",
+        kinematics="linear",
+        shear_factor=1.0,
+        velocity=1000.0,
+        duration=1e-3,
+    )
+    problem = problem_of(deck)
+    columns, rows = 2 * mesh[0] + 1, 2 * mesh[1] + 1
+    last = columns * rows
+    edges = [(1, last - columns + 1, 3), (columns, last, 3), (1, columns, 4)]
+    edges.append((last - columns + 1, last, 4))
+    codes = problem.mesh.codes.copy()
+    codes[:, :2] = 1
+    places = problem.mesh.coordinates
+    cards = []
+    for first, end, across in edges:
+        axis = 0 if across == 3 else 1
+        nodes = places[:, axis] == places[first - 1, axis]
+        if k_w == np.inf:
+            codes[nodes, 2] = codes[nodes, 7 - across] = 1  # w, and the rotation along the edge
+        if k_r == np.inf:
+            codes[nodes, across] = 1
+        values = [0.0] * 5
+        values[across] = 0.0 if k_r == np.inf else k_r
+        values[2] = 0.0 if k_w == np.inf else k_w
+        cards.append(NodeValues(first, end, tuple(values)))
+    supported = problem_of(with_segments(deck, Springs(tuple(cards), word="LINE"))).plate
+    plate = with_codes(supported, codes)
+    omega = modes(plate, 6, consistent=False).angular_frequency
+    expected = [float(row[f"f{n}_Hz"]) for n in range(1, 7)]
+    assert omega / (2.0 * np.pi) == pytest.approx(expected, rel=of_frequencies)
+    assert problem.contact is not None
+    flexibility = static_response(plate, problem.contact).compliance
+    assert flexibility == pytest.approx(float(row["flexibility_mm_per_N"]), rel=of_flexibility)
+
+
+def test_a_point_mass_lowers_the_frequency_as_rayleighs_quotient_says() -> None:
+    deck = fecm.impact(
+        fecm.Plate.rectangle((300.0, 200.0), (24, 16), support="simple"),
+        fecm.Laminate("[0/90/0/90/0]s", PLY, 0.2),
+        fecm.RigidMass(1e-3),
+        model.Indentation(5e4, 1e6, 0.1, 1.5),
+        units="mm-N-s", kinematics="linear", velocity=1000.0, duration=1e-3,
+    )  # fmt: skip
+    plate = problem_of(deck).moving_plate
+    first = modes(plate, 1, consistent=False)
+    shape = plate.field(first.shapes[0], 0.0)[:, 2]
+    centre = int(np.argmax(np.abs(shape)))
+    mass = 0.02 / float(shape[centre]) ** 2
+    loaded = with_segments(deck, PointMasses((NodeValues(centre + 1, 0, (mass, 0.0)),)))
+    second = modes(problem_of(loaded).moving_plate, 1, consistent=False)
+    ratio = second.angular_frequency[0] / first.angular_frequency[0]
+    assert ratio == pytest.approx(1.0 / np.sqrt(1.02), rel=1e-3)
+    more = problem_of(loaded).plate.total_mass() - problem_of(deck).plate.total_mass()
+    assert more == pytest.approx(mass, rel=1e-9)
+
+
+# Sweeps ------------------------------------------------------------------------------------------
+
+
+def test_a_sweep_on_springs_shares_a_response_and_equals_runs() -> None:
+    deck = with_segments(free_plate((12, 8)), pulling_too((12, 8)))
+    swept = fecm.sweep(deck, {"velocity": [500.0, 1500.0]})
+    for case, velocity in enumerate((500.0, 1500.0)):
+        peak = run(deck.with_(velocity=velocity)).history.force.max()
+        assert swept["peak_force"][case] == pytest.approx(peak, rel=1e-11)
+
+
+def test_a_sweep_on_one_sided_supports_runs_every_case() -> None:
+    deck = with_segments(free_plate((12, 8)), pushing((12, 8), gap=1e-2))
+    swept = fecm.sweep(deck, {"velocity": [500.0, 1500.0]})
+    for case, velocity in enumerate((500.0, 1500.0)):
+        peak = run(deck.with_(velocity=velocity)).history.force.max()
+        assert swept["peak_force"][case] == peak
+
+
+def test_what_needs_a_linear_plate_names_the_one_sided_supports(tmp_path: Path) -> None:
+    strains = tmp_path / "strains.csv"
+    strains.write_text("time,1,2\n0,0,0\n1e-4,1e-5,1e-5\n2e-4,0,0\n")
+    deck = with_segments(free_plate((12, 8), duration=2e-4), pushing((12, 8)))
+    time, force = np.linspace(0.0, 2e-4, 50), np.sin(np.linspace(0.0, np.pi, 50))
+    with pytest.raises(fecm.FecmError, match="the deck has UNIL"):
+        fecm.identify(deck, time, force, ["k"])
+    with pytest.raises(fecm.FecmError, match="the deck has UNIL"):
+        fecm.locate(deck, strains)
