@@ -87,7 +87,8 @@ def force(
 ) -> Picture:
     """Draw contact force and transducer against time.
 
-    The contact forces of several results have one graph, the transducers another. The transducer of
+    The contact forces of several results have one graph, the transducers another. Springs and
+    one-sided supports of a single result have their pushing and pulling forces. The transducer of
     a rigid mass is its contact force and is not drawn again. A dashed line marks the delamination
     threshold of a result that has one. `overlay` is a measured force: a CSV file with the columns
     time and force (or transducer), or times and forces. It is converted to the deck's units if it
@@ -118,6 +119,8 @@ def force(
 
     figure, axes = _draw_forces(drawn, pound, width, _of_whole(results))
     _mark_thresholds(axes[0], limits, words, list(drawn), pound)
+    if len(results) == 1:
+        _draw_supports(axes[0], *results.values())
     time_axis(axes[-1], style.scale_of(results, "time", times), times)
     _mark_open_ends(axes[0], results, width)
     notes = []
@@ -132,6 +135,16 @@ def force(
             notes.append(f"{measured.quantity} of {name} against {measured.name}: {compared}")
     style.lines_legend(figure, axes[0])
     return Picture(figure, notes=notes)
+
+
+def _draw_supports(axes: Axes, result: Result) -> None:
+    """Draw the forces with which springs and one-sided supports push and pull, if stored."""
+    if "supports/push" not in result:
+        return
+    for name, colour in (("push", style.COLOURS[2]), ("pull", style.COLOURS[3])):
+        if (values := result.whole(f"supports/{name}")).any():
+            label = f"supports {name}"
+            axes.plot(result["supports/time"], values, ls=style.DASHED, color=colour, label=label)
 
 
 def _draw_forces(

@@ -30,6 +30,8 @@ class Support(StrEnum):
     CLAMPED = "clamped"
     W_HELD = "w held"
     ROTATION_HELD = "rotation held"
+    SPRING = "spring"
+    ONE_SIDED = "pushes only"
 
 
 HOLLOW: style.Look = {"mfc": "white", "mew": 0.7}
@@ -39,11 +41,13 @@ MARKS: dict[Support, style.Look] = {
     Support.CLAMPED: {"marker": "s", "color": style.COLOURS[0], "ms": 3.0},
     Support.W_HELD: HOLLOW | {"marker": "^", "color": style.COLOURS[0], "ms": 3.5},
     Support.ROTATION_HELD: HOLLOW | {"marker": "o", "color": style.COLOURS[2], "ms": 3.0},
+    Support.SPRING: {"marker": "D", "color": style.COLOURS[3], "ms": 3.0},
+    Support.ONE_SIDED: HOLLOW | {"marker": "v", "color": style.COLOURS[0], "ms": 3.5},
 }
 
 
 def support_masks(result: Result) -> dict[Support, Bools]:
-    """Return masks of the nodes that are held against bending, (numnp,), by kind of support."""
+    """Return masks of the nodes that are supported against bending, (numnp,), by kind."""
     held = result["mesh/equations"][:, 2:5] == 0
     w, rotations = held[:, 0], held[:, 1:]
     full = w & rotations.all(axis=1)
@@ -56,10 +60,16 @@ def support_masks(result: Result) -> dict[Support, Bools]:
     corners[nodes[(has_one_end & several)[:, None] & present]] = True
     other_nodes[nodes[~has_one_end[:, None] & present]] = True
     clamped = full & ~(corners & ~other_nodes)
+    springs, one_sided = np.zeros_like(w), np.zeros_like(w)
+    if "supports/node" in result:
+        rows, pushes = result["supports/node"] - 1, result["supports/side"] != 0
+        springs[rows[~pushes]] = one_sided[rows[pushes]] = True
     return {
         Support.CLAMPED: clamped,
         Support.W_HELD: w & ~clamped,
         Support.ROTATION_HELD: ~w & rotations.any(axis=1),
+        Support.SPRING: springs,
+        Support.ONE_SIDED: one_sided,
     }
 
 

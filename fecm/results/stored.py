@@ -29,7 +29,7 @@ ONE_RESULT = (
     "fecm.run a list only for a deck with several problems"
 )
 # Groups whose forces and energies belong to the part. Elsewhere a force is one per length.
-OF_PART = ("history", "tape9", "energy")
+OF_PART = ("history", "tape9", "energy", "supports")
 MEMBRANE_ENERGIES = tuple(
     f"membrane/{name}" for name in ("energy", "strain_energy", "preload_energy")
 )

@@ -41,10 +41,19 @@ if TYPE_CHECKING:
     from fecm.results.exposures import FirstFailure
 
 
+class SupportsJson(TypedDict):
+    """Largest values of springs, one-sided supports and restraints of w, in JSON."""
+
+    push: Annotated[float, "Sum of the forces on w against the push."]
+    pull: Annotated[float, "Sum of the forces on w along the push."]
+    lift: Annotated[float, "Distance of the plate from a one-sided support."]
+
+
 class MetricsJson(TypedDict, total=False):
     """Metrics of a run in JSON: numbers by name, and what FAIL found."""
 
     failure: Annotated[FailureJson, "Of decks with FAIL."]
+    supports: Annotated[SupportsJson, "Largest values, of decks with SPRI or UNIL and DISP."]
 
 
 class RunJson(TypedDict):
@@ -186,6 +195,8 @@ def _response(result: Stored) -> list[Row]:
         rows.append(("largest w", "0: nothing moved the plate"))
     if text := _membrane(result):
         rows.append(("membrane", text))
+    if largest := largest_of_supports(result):
+        rows.append(("supports", _supports(result, largest)))
     if "modes/angular_frequency" in result:
         frequencies = result["modes/angular_frequency"]
         texts = ", ".join(significant(omega) for omega in frequencies[:LISTED])
@@ -300,6 +311,28 @@ def _membrane(result: Stored) -> str:
         return ""
     percent = 100.0 * float(result["membrane/energy"][row]) / float(elastic[row])
     return f"{percent:.{0 if percent > 9.5 else 1}f} % of the strain energy {when}"
+
+
+def largest_of_supports(result: Stored) -> SupportsJson | None:
+    """Return the largest forces of the supports, and the lift; None if they are not stored."""
+    if "supports/push" not in result or not result["supports/push"].size:
+        return None
+    push, pull, lift = (
+        float(result.whole(f"supports/{name}").max()) for name in ("push", "pull", "lift")
+    )
+    return {"push": push, "pull": pull, "lift": lift}
+
+
+def _supports(result: Stored, largest: SupportsJson) -> str:
+    """Say how hard the supports push and pull, and how far the plate lifts off."""
+    push, pull = (_quantity(result, largest[name], "force") for name in ("push", "pull"))
+    pulls = "do not pull"
+    if largest["pull"]:
+        peak = float(result.whole("history/force").max()) if "history/force" in result else 0.0
+        share = f" ({largest['pull'] / peak:.0%} of the peak force)" if peak else ""
+        pulls = f"pull with {pull}{share}"
+    lift = f", the plate lifts off by {_quantity(result, largest['lift'], 'length')}"
+    return f"push with {push}, {pulls}{lift if largest['lift'] else ''}"
 
 
 def _delamination(result: Stored) -> str:
@@ -600,11 +633,13 @@ def about_run(result: Stored) -> RunJson:
 
 
 def _metrics(result: Stored) -> MetricsJson:
-    """Return the impact metrics, and the metrics of FAIL under ``failure``."""
-    if "failure/x" not in result:
-        return cast("MetricsJson", metrics_of(result))
-    metrics = {**metrics_of(result), "failure": failure_metrics(result)}
-    return cast("MetricsJson", metrics)
+    """Return the metrics of the impact, of FAIL and of the supports."""
+    metrics = cast("MetricsJson", dict(metrics_of(result)))
+    if "failure/x" in result:
+        metrics["failure"] = failure_metrics(result)
+    if largest := largest_of_supports(result):
+        metrics["supports"] = largest
+    return metrics
 
 
 def _missing(result: Stored) -> str:
