@@ -17,6 +17,7 @@ from tests.broken import (
     plies,
     stretching,
     studies,
+    supports,
     waves_and_rods,
 )
 
@@ -29,6 +30,7 @@ BREAKS = {
     **stretching.BREAKS,
     **curved.BREAKS,
     **studies.BREAKS,
+    **supports.BREAKS,
 }
 
 

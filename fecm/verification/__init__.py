@@ -17,6 +17,7 @@ from fecm.verification import (  # noqa: F401  (importing them fills CASE_OF)
     plates,
     stretching,
     studies,
+    supports,
 )
 from fecm.verification.case import CASE_OF, TABLES, Case, Row, compute_rows
 

@@ -1,0 +1,27 @@
+"""Springs and one-sided supports broken on purpose."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from fecm.mechanics import solutions
+from fecm.mechanics.plate import PlateModel
+from fecm.problem import supports
+from tests.breaks import Breaks, changed, instead
+
+
+def held(right: Any, plate: PlateModel, contact: Any) -> Any:
+    return right(replace(plate, supports=plate.supports and plate.supports.held()), contact)
+
+
+BREAKS: Breaks = {
+    "half of the springs": (
+        changed(supports, "spring_stiffness", lambda springs: 0.5 * springs),
+        {"elastic-edges": ("f",)},
+    ),
+    "a window that pulls": (
+        instead(solutions, "static_response", held),
+        {"pushing-window": ("flexibility",)},
+    ),
+}
