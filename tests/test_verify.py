@@ -169,7 +169,7 @@ STATED = {
     "static-bending", "frequencies", "wave-fronts", "dispersion", "rod-pulse", "infinite-plate",
     "supported-plate", "patch-impact", "failure", "cured-failure", "small-mass", "large-mass",
     "contact-coefficient", "stretching-plate", "stretching-disc", "stretching-impact", "sandwich",
-    "curved-panel", "curved-impact", "location",
+    "curved-panel", "curved-impact", "location", "elastic-edges", "pushing-window",
 }  # fmt: skip
 
 
