@@ -235,3 +235,81 @@ def test_the_default_mesh_of_a_window_has_elements_as_short_as_the_radius_of_the
         deck = new(*window, "--patch", f"disc:{radius}")
         assert "W447" not in deck.stderr
         assert fecm.read_one(deck.stdout).control.numel >= least
+
+
+# A window that only pushes, and clamps ------------------------------------------------------------
+
+TEST = ("--fixture", "D7136", *PLATE, "--energy", "5J", "--kinematics", "linear")
+
+
+def test_a_window_that_only_pushes_has_supports_on_its_edges_and_holds_no_w() -> None:
+    (problem,) = load_deck(new(*TEST, "--window", "push", *QUICK).stdout).problems
+    (held,) = load_deck(new(*TEST, *QUICK).stdout).problems
+    assert not (problem.mesh.equations[:, 2] == 0).any()
+    supports = problem.plate.supports
+    assert supports is not None
+    assert (supports.side == 1.0).all()
+    rows = np.flatnonzero(held.mesh.equations[:, 2] == 0)
+    assert sorted(supports.node.tolist()) == rows.tolist()
+
+
+@pytest.mark.parametrize(
+    ("clamps", "stiffness"), [("held", None), ("2kN/mm", 2000.0), ("350", 350.0)]
+)
+def test_clamps_hold_or_spring_the_nodes_nearest_to_their_tips(
+    clamps: str, stiffness: float | None
+) -> None:
+    answer = new(*TEST, "--window", "push", "--clamps", clamps, *QUICK)
+    (problem,) = load_deck(answer.stdout).problems
+    plate = problem.plate
+    assert plate.supports is not None
+    springs = plate.supports.select(~plate.supports.is_one_sided)
+    nodes = springs.node
+    if stiffness is None:
+        (nodes,) = np.nonzero(problem.mesh.equations[:, 2] == 0)
+        assert not len(springs.node)
+    else:
+        assert springs.stiffness.tolist() == [stiffness] * 4
+        assert springs.dof.tolist() == [2] * 4
+    x, y = problem.mesh.coordinates.T
+    for tip in [(19.0, 6.0), (131.0, 6.0), (19.0, 94.0), (131.0, 94.0)]:
+        assert np.hypot(x - tip[0], y - tip[1]).argmin() in nodes
+    assert len(nodes) == 4
+    # Clamps hold the plate down on purpose: they are no window that pulls.
+    assert not problem.knife_edges.any()
+
+
+def test_the_note_of_a_window_that_pulls_has_the_band_that_a_pushing_window_confirms() -> None:
+    program = ("--mesh", "8x6", "--duration", "6ms", "--every", "200")
+    held, pushed = (
+        fecm.run_one(new(*TEST, *program, *window).stdout) for window in ((), ("--window", "push"))
+    )
+    (note,) = [note for note in held.notes if note.startswith("the supports pull")]
+    softer, low, high = map(
+        float, re.findall(r"then ([0-9.]+)% .* between ([0-9.]+) N and ([0-9.]+) N", note)[0]
+    )
+    assert 5.0 < softer < 20.0
+    assert high == pytest.approx(held.history.force.max(), rel=1e-3)
+    # The band is that of the impact on the static plate.
+    assert low == pytest.approx(pushed.history.force.max(), rel=0.02)
+    assert not [note for note in pushed.notes if note.startswith("the supports pull")]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            ("--size", "100x100", "--mesh", "8x8", "--window", "push"),
+            "--window belongs to a --fixture",
+        ),
+        (("--fixture", "window:100x100,80x80", "--clamps", "held"), "those of a standard, D7136"),
+        (("--fixture", "D7136", "--clamps", "-5"), "clamps"),
+        (("--fixture", "D7136", "--clamps", "5 J"), "clamps"),
+    ],
+)
+def test_a_window_and_clamps_that_can_not_be_are_refused(
+    options: tuple[str, ...], message: str
+) -> None:
+    answer = call("new", "-", *options, *PLATE, "--energy", "5J", *QUICK)
+    assert_unusable(answer)
+    assert message in answer.stderr

@@ -7,6 +7,7 @@ D7136, 125 x 75 in a plate of 150 x 100; the third has springs along all edges.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -31,8 +32,10 @@ from fecm.mechanics.stiffness_product import internal_force_operator
 from fecm.mechanics.supports import NodeSupports
 from fecm.mechanics.symmetry import symmetry_reduction, unreduced, with_codes
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
+from fecm.plot.mesh import Support, support_masks
 from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
+from fecm.results.summary import about_run, run_summary
 from tests.builders import Floats, table
 
 SIZE = 150.0, 100.0
@@ -420,3 +423,38 @@ def test_what_needs_a_linear_plate_names_the_one_sided_supports(tmp_path: Path) 
         fecm.identify(deck, time, force, ["k"])
     with pytest.raises(fecm.FecmError, match="the deck has UNIL"):
         fecm.locate(deck, strains)
+
+
+# Summary and pictures ----------------------------------------------------------------------------
+
+
+def test_the_summary_says_what_pushes_pulls_and_lifts() -> None:
+    deck = free_plate((12, 8), duration=5e-4)
+    both = run(with_segments(deck, pulling_too((12, 8))))
+    (line,) = [row for row in run_summary(both) if row.lstrip().startswith("supports")]
+    push, pull, share = re.findall(
+        r"push with ([0-9.]+) N, pull with ([0-9.]+) N \(([0-9]+)%", line
+    )[0]
+    assert float(push) == pytest.approx(both["supports/push"].max(), rel=1e-3)
+    assert float(pull) == pytest.approx(both["supports/pull"].max(), rel=1e-3)
+    assert float(share) / 100 == pytest.approx(float(pull) / both.history.force.max(), abs=0.01)
+    alone = run(with_segments(deck, pushing((12, 8))))
+    (line,) = [row for row in run_summary(alone) if row.lstrip().startswith("supports")]
+    assert "do not pull" in line
+    lift = float(re.findall(r"lifts off by ([0-9.]+) mm", line)[0])
+    assert lift == pytest.approx(alone["supports/lift"].max(), rel=1e-3)
+    assert about_run(alone)["metrics"]["supports"] == {
+        "push": alone["supports/push"].max(), "pull": 0.0, "lift": alone["supports/lift"].max()
+    }  # fmt: skip
+
+
+def test_the_picture_of_the_mesh_marks_springs_and_one_sided_supports() -> None:
+    springs = Springs((NodeValues(5, 0, (0.0, 0.0, 100.0, 0.0, 0.0)),))
+    result = run(with_segments(free_plate((12, 8), duration=2e-5), pushing((12, 8)), springs))
+    masks = support_masks(result)
+    assert np.flatnonzero(masks[Support.SPRING]).tolist() == [4]
+    x, y = result["mesh/coordinates"].T
+    on_window = ((x == 12.5) | (x == 137.5)) & (y >= 12.5) & (y <= 87.5)
+    on_window |= ((y == 12.5) | (y == 87.5)) & (x >= 12.5) & (x <= 137.5)
+    assert (masks[Support.ONE_SIDED] == on_window).all()
+    assert not masks[Support.W_HELD].any()
