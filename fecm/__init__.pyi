@@ -52,6 +52,8 @@ from fecm.simulation.job import Run as Run
 from fecm.simulation.job import run as run
 from fecm.simulation.job import run_one as run_one
 from fecm.studies.indentation_test.study import fit_indentation as fit_indentation
+from fecm.studies.modes import PlateModes as PlateModes
+from fecm.studies.modes import modes as modes
 from fecm.studies.rod_test.study import pulse_test as pulse_test
 from fecm.studies.waves.study import waves as waves
 from fecm.sweeps.estimate import estimate as estimate

@@ -35,6 +35,7 @@ from fecm.deck.findings import FindingJson
 from fecm.problem.summary import ProblemSummary
 from fecm.results.difference import DifferenceJson, PositionJson
 from fecm.results.summary import MetricsJson
+from fecm.studies.modes import ModesJson
 from fecm.sweeps.about import SweepJson
 from fecm.sweeps.mesh_error import MeshErrorEstimate
 
@@ -74,6 +75,7 @@ OUTPUTS: dict[str, tuple[str, list[type]]] = {
     "sweep": ("Output of `fecm sweep --format json`", [SweepJson]),
     "info": ("Output of `fecm info --format json`", [RunFileJson, SweepFileJson, LocationFileJson]),
     "diff": ("Output of `fecm diff --format json`", [DifferenceJson]),
+    "modes": ("Output of `fecm modes --format json`", [ModesJson]),
 }
 
 

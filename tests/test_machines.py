@@ -193,6 +193,7 @@ def test_outputs_of_check_run_info_and_diff_are_as_their_schemas_say(folder: Pat
     validate(
         "diff", output_of("diff", "c.h5", "d.h5"), output_of("diff", "c.h5", "e.h5", *own, status=1)
     )
+    validate("modes", output_of("modes", "sound.inp"))
     validate("diff", output_of("diff", "a.h5", "c.h5", status=1), output_of("diff", "s.h5", "s.h5"))
 
 

@@ -66,6 +66,7 @@ GROUPED = {
         "estimate": LazyCommand(
             "fecm.cli.estimate", "Estimate an impact and its damage threshold."
         ),
+        "modes": LazyCommand("fecm.cli.modes", "Find natural frequencies and modes of a plate."),
         "diff": LazyCommand("fecm.cli.diff", "Compare two results dataset by dataset."),
         "verify": LazyCommand(
             "fecm.cli.verify", "Compare fecm with closed forms and the literature."

@@ -300,6 +300,7 @@ class Format(StrEnum):
     TEXT = "text"
     JSON = "json"
     SARIF = "sarif"
+    CSV = "csv"
 
 
 MODE_OPTION = click.option(

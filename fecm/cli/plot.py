@@ -94,9 +94,9 @@ class PlotOptions:
     type=OneOf([*map(str, KINDS)]),
     multiple=True,
     metavar="KIND",
-    help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a sweep, "
-    "exceedance of a random one, measured of a table with measured results; location of a "
-    "located impact]",
+    help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; modes of a "
+    "result of `fecm modes`; map of a sweep, exceedance of a random one, measured of a table with "
+    "measured results; location of a located impact]",
 )
 @option(
     "-o",
@@ -232,7 +232,8 @@ def plot_command(
 def _usual(first: Result | SweepResult | Location) -> PictureKind:
     """Return the kind of picture that is drawn by default."""
     if isinstance(first, Result):
-        return PictureKind.FORCE
+        has_modes_only = "history/force" not in first and "modes/shape" in first
+        return PictureKind.MODES if has_modes_only else PictureKind.FORCE
     # 46 ms, which results of runs do not need.
     from fecm.sweeps.measured import compared_columns
     from fecm.sweeps.result import SweepResult

@@ -178,13 +178,19 @@ class Reader:
     """
 
     def __init__(
-        self, text: str, *, blanks_are_zeros: bool = False, keeps_values: bool = False
+        self,
+        text: str,
+        *,
+        blanks_are_zeros: bool = False,
+        keeps_values: bool = False,
+        needs_program: bool = True,
     ) -> None:
         keywords = (*SEGMENTS, END)
         self.cards = CardStream(
             text, keywords, blanks_are_zeros=blanks_are_zeros, keeps_values=keeps_values
         )
         self.findings = self.cards.findings
+        self._needs_program = needs_program  # whether a problem without one is an error
         self._segments = 0  # number of segments of the file
         self._counted = Counter[str]()  # total number of nodes and elements of the problems
 
@@ -360,9 +366,10 @@ class Reader:
             self._report_stray(card, [MACROS])
             if card.is_keyword:  # a misspelt MACR: the program follows nevertheless
                 return self._read_macros(card)
-        message = "The problem has no macro program."
-        self.findings.add("E009", message, title.place, "it starts with a MACR card")
-        cards.unsound.add(MACROS)
+        if self._needs_program:
+            message = "The problem has no macro program."
+            self.findings.add("E009", message, title.place, "it starts with a MACR card")
+            cards.unsound.add(MACROS)
         return []
 
     def _read_macros(self, head: Card) -> list[Macro]:

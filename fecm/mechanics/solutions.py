@@ -43,6 +43,9 @@ SHIFT = 1.0e-9
 # sizes.
 FACTORS = 300
 MOST_ACTIVE_SETS = 50  # of one-sided supports; up to 19 were seen
+# Squares of frequencies up to it are rounding errors, relative to the largest ratio of diagonal
+# entries of K and M; those of rigid motions are below 1e-17.
+RIGID = 1.0e-15
 # A rigid motion is free if its eigenvalue, relative to the largest, is smaller.
 NOT_HELD = 1.0e-9
 
@@ -367,16 +370,18 @@ def modes(plate: PlateModel, count: int, *, consistent: bool, field: Floats | No
     K = tangent_stiffness(plate, field)
     M = plate.consistent_mass if consistent else sparse.diags_array(plate.mass, format="csr")
     count = min(count, plate.neq)
+    largest_ratio = float((K.diagonal() / M.diagonal()).max())
     if plate.neq < DENSE or count >= plate.neq // 2:
         values, vectors = linalg.eigh(K.toarray(), M.toarray(), subset_by_index=[0, count - 1])
     else:
-        shift = -SHIFT * float((K.diagonal() / M.diagonal()).max())
+        shift = -SHIFT * largest_ratio
         start = np.random.default_rng(0).standard_normal(plate.neq)
         values, vectors = eigsh(K, count, M, sigma=shift, which="LM", v0=start)
         order = np.argsort(values)
         values, vectors = values[order], vectors[:, order]
     largest = vectors[np.abs(vectors).argmax(axis=0), np.arange(count)]
-    return Modes(np.sqrt(np.maximum(values, 0.0)), (vectors * np.sign(largest)).T)
+    elastic = np.where(values > RIGID * largest_ratio, values, 0.0)
+    return Modes(np.sqrt(elastic), (vectors * np.sign(largest)).T)
 
 
 # Factors on the preload are searched from LEAST to FAR; each try changes the shift by STRIDE.

@@ -53,6 +53,7 @@ class PictureKind(StrEnum):
     CONTOUR = auto()
     SURFACE = auto()
     MESH = auto()
+    MODES = auto()
     ANIMATION = auto()
     MAP = auto()
     EXCEEDANCE = auto()
@@ -109,6 +110,7 @@ KINDS: dict[str, Drawing] = {
     PictureKind.MESH: Drawing(
         "mesh:mesh_picture", Shows.RUN, "mesh, supports, impact point and contact patch"
     ),
+    PictureKind.MODES: Drawing("modes:modes_picture", Shows.RUN, "natural modes of the plate"),
     PictureKind.ANIMATION: Drawing("plate:animation", Shows.RUN, "the moving plate", (".gif",)),
     PictureKind.MAP: Drawing(
         "maps:parameter_map", Shows.SWEEP, "a quantity of a sweep over its parameters"

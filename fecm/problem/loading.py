@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -61,11 +62,15 @@ class LoadedDeck(NamedTuple):
 AnyDeck = str | Path | AnyFile | Deck | LoadedDeck
 
 
-def load_deck(deck: AnyDeck, mode: str = REPORT) -> LoadedDeck:
+def load_deck(
+    deck: AnyDeck, mode: str = REPORT, change: Callable[[Deck], Deck] | None = None
+) -> LoadedDeck:
     """Read and check a deck without running it.
 
     In listing mode blanks inside numbers are zeros, and decks that the printed program can't
-    compute are errors. Raises OSError if the file can't be read.
+    compute are errors. `change` gives each problem another program, and perhaps other segments,
+    before it is checked; problems may then lack a program. Raises OSError if the file can't be
+    read.
     """
     if isinstance(deck, LoadedDeck):
         return deck
@@ -74,11 +79,13 @@ def load_deck(deck: AnyDeck, mode: str = REPORT) -> LoadedDeck:
     else:
         text, source = load_text(deck)
     listing = mode == LISTING
-    reader = Reader(text, blanks_are_zeros=listing)
+    reader = Reader(text, blanks_are_zeros=listing, needs_program=change is None)
     problems: list[Problem] = []
     for read in reader.problems():
         if reader.findings.closed:
             break
+        if change is not None and read.deck is not None:
+            read = replace(read, deck=change(read.deck))
         if (checked := check_problem(read, reader.findings, uses_l2=not listing)) is not None:
             problems.append(checked)
     if listing and not reader.findings.errors:

@@ -362,15 +362,19 @@ class Problem:
     @cached_property
     def contact(self) -> Floats | None:
         """Distribution of a unit contact force over the dofs, (numnp, 5); None without impact."""
-        if not self.has_impact:
-            return None
-        contact = np.zeros(self.mesh.equations.shape)
+        return self.unit_load if self.has_impact else None
+
+    @property
+    def unit_load(self) -> Floats | None:
+        """Unit force on the patch, or on the dof of ROD, (numnp, 5); None without both."""
+        load = np.zeros(self.mesh.equations.shape)
         if self.patch is not None:
-            contact[:, W] = self.patch.weights
+            load[:, W] = self.patch.weights
+        elif (card := self.deck.last(model.Impact)) is not None:
+            load[card.node - 1, card.dof - 1] = 1.0
         else:
-            card = self.deck.require(model.Impact)
-            contact[card.node - 1, card.dof - 1] = 1.0
-        return contact
+            return None
+        return load
 
     @cached_property
     def threshold(self) -> Threshold | None:
