@@ -16,6 +16,7 @@ from typing import Literal, get_args
 from fecm._options import documented, option
 from fecm.authoring.contact import AnyContact, Sphere
 from fecm.authoring.laminate import Laminate, Layup
+from fecm.authoring.masses import PlacedMass
 from fecm.authoring.mesh import InPlane
 from fecm.authoring.parameters import ObjectError, check_kind
 from fecm.authoring.plate import DropWeight, Plate
@@ -115,6 +116,14 @@ class DeckOptions:
         "temperature, by default the ply's, and the temperature of use, as in 177:20 or :20.",
         group="Laminate",
         metavar="DT|FREE:USE",
+    )
+    masses: Iterable[PlacedMass] = option(
+        (),
+        "Point mass (MASS) at the node nearest to X,Y, and its rotary inertia, in the deck's units "
+        "or with units, as in 20,30:5g.",
+        python="As x, y, mass, and perhaps the rotary inertia, of each.",
+        group="Plate",
+        flag="--mass-at",
     )
     title: str | None = option(
         None,

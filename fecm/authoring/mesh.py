@@ -8,6 +8,7 @@ from dataclasses import replace
 from enum import Enum, auto
 from typing import Literal, NamedTuple, Self
 
+from fecm.authoring.elastic_edges import elastic_edge, is_elastic
 from fecm.authoring.laminate import DeckPlies
 from fecm.authoring.parameters import (
     ObjectError,
@@ -215,15 +216,26 @@ def support_plate(
         in_plane = in_plane or (FREE if plate.fixture else default)
     if membrane is MembraneSupport.CURVED:
         notes.append(_note_of_curved(plate, in_plane))
-    if isinstance(mesh, PlateMesh):
-        boundary = mesh.supported(everywhere, plate.supports, in_plane=in_plane)
-        return Supported(() if boundary is None else (boundary,), "")
-    if (fixture := plate.fixture) is None:
-        boundary = mesh.supported(everywhere, plate.supports, in_plane=in_plane)
-        return Supported(() if boundary is None else (boundary,), "")
+    if isinstance(mesh, PlateMesh) or (fixture := plate.fixture) is None:
+        return Supported(tuple(_on_edges(plate, mesh, everywhere, in_plane, system)), "")
     comment = "! The plate slides on the window: u and v are free.\n" if in_plane == FREE else ""
     segments = _on_fixture(fixture, mesh, everywhere, in_plane, system)
     return Supported(tuple(segments), comment)
+
+
+def _on_edges(
+    plate: Plate, mesh: AnyMesh, everywhere: Sequence[int], in_plane: InPlane, system: str | None
+) -> Iterator[Segment]:
+    """Yield the segments of the restraints and the springs of the edges."""
+    elastic = {
+        name: elastic_edge(name, text, system)
+        for name, text in plate.supports.items()
+        if is_elastic(text)
+    }
+    supports = {**plate.supports, **{name: edge.restraint for name, edge in elastic.items()}}
+    boundary = mesh.supported(everywhere, supports, in_plane=in_plane)
+    springs = mesh.springs({name: edge.stiffness for name, edge in elastic.items()}, supports)
+    yield from (segment for segment in (boundary, springs) if segment is not None)
 
 
 def _on_fixture(

@@ -43,6 +43,7 @@ from fecm.authoring.laminate import (
     system_asked,
     toughness_segment,
 )
+from fecm.authoring.masses import masses_segment
 from fecm.authoring.mesh import (
     AnyMesh,
     MembraneSupport,
@@ -242,7 +243,7 @@ def plate_deck(options: PlateDeckOptions) -> model.Deck:
         zones, in_zones, placed.mesh, placed.node, doubts, plies.system
     )
     strengths = [strengths_of(plies)] if options.failure else []
-    plain = assemble(options, plies, placed.mesh, laminates_of_elements, [load], strengths)
+    plain = assemble(options, plies, placed.mesh, laminates_of_elements, doubts, [load], strengths)
     title = options.title
     if title is None:
         title = title_of(options.plate, options.laminate, plies)
@@ -320,7 +321,7 @@ def author(options: ImpactOptions) -> Authored:
     damage = _segments_of_failure(options, plies, struck, giic, notes)
     hit = model.Impact(node, 3, 1.0 if motion.velocity is None else motion.velocity)
     load = (_projectile_segment(options.projectile, plies.system), hit, patch)
-    plain = assemble(options, plies, mesh, placed, load, damage, law)
+    plain = assemble(options, plies, mesh, placed, doubts, load, damage, law)
     if motion.energy is not None:
         plain = with_energy(plain, motion.energy)
     notes += [
@@ -385,19 +386,22 @@ def assemble(
     plies: DeckPlies,
     mesh: AnyMesh,
     zones: ElementLaminates,
+    doubts: list[str],
     load: Iterable[model.Segment | None],
     damage: Iterable[model.Segment],
     law: model.Indentation | None = None,
 ) -> model.Deck:
     """Return a deck with the segments in their usual order, without title, supports and program.
 
-    `load` has the segments of the impact or of the static load.
+    `load` has the segments of the impact or of the static load. `doubts` gets a text about each
+    point mass that is moved to a node.
     """
     segments = (
         _unit_segment(options, plies),
         mesh.coordinates(),
         mesh.element_cards(),
         *load,
+        masses_segment(options.masses, mesh, doubts, plies.system),
         _gage_segment(options.gages, plies.system),
         *damage,
         cure_segment(plies, options.cure),

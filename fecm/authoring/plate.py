@@ -11,6 +11,7 @@ from typing import Literal, NamedTuple, Self, get_args
 from numpy.typing import ArrayLike
 
 from fecm._table import Table, html_table
+from fecm.authoring.elastic_edges import check_support, is_elastic
 from fecm.authoring.parameters import (
     ObjectError,
     check_positive,
@@ -19,7 +20,7 @@ from fecm.authoring.parameters import (
 )
 from fecm.deck import grid as grids
 from fecm.deck.catalogue import STANDARD
-from fecm.deck.grid import EDGES, SUPPORTS, GridSection
+from fecm.deck.grid import EDGES, GridSection
 from fecm.deck.quantities import is_number, text_of
 from fecm.problem import plate_mesh
 from fecm.problem.plate_mesh import BOUNDARY, GridLike, MeshLike, PlateMesh
@@ -169,8 +170,8 @@ class Plate:
         size: tuple[float | str, float | str] | None = None,
         mesh: tuple[int, int] | None = None,
         *,
-        support: Support = "free",
-        edges: Mapping[str, Support] | None = None,
+        support: Support | str = "free",
+        edges: Mapping[str, Support | str] | None = None,
         grading: float = 1.0,
         columns: str = "",
         rows: str = "",
@@ -186,7 +187,9 @@ class Plate:
             Numbers of elements along x and y.
         support : str
             Support of all edges: ``"free"``, ``"soft"``, ``"simple"``, ``"pinned"`` or
-            ``"clamped"``.
+            ``"clamped"``; or springs, ``"spring:KR[,KW]"``: KR against the rotation across the
+            edge, moment per rotation and length, and KW against w, force/length², each also with a
+            unit. Without KW the edge holds w and the rotation along it.
         edges : dict, optional
             Support of single edges: ``"left"``, ``"right"``, ``"bottom"`` or ``"top"``.
         grading : float
@@ -209,11 +212,9 @@ class Plate:
         """
         supports = dict.fromkeys(EDGES, str(support)) | dict(edges or {})
         for edge, kind in supports.items():
-            if edge not in EDGES or kind not in SUPPORTS:
-                raise ObjectError(
-                    f"{edge}={kind}: the edges are {', '.join(EDGES)}, the supports "
-                    f"{', '.join(SUPPORTS)}"
-                )
+            if edge not in EDGES:
+                raise ObjectError(f"{edge}={kind}: the edges are {', '.join(EDGES)}")
+            check_support(edge, kind)
         check_positive(grading=grading)
         if grading < 1.0:
             raise ObjectError(f"`grading` is {grading:g}; it must be 1 or more")
@@ -297,7 +298,7 @@ class Plate:
     def from_mesh(
         cls,
         mesh: str | Path | MeshLike | GridLike | tuple[ArrayLike, ArrayLike],
-        support: Mapping[str, Support] | Support | None = None,
+        support: Mapping[str, Support | str] | Support | str | None = None,
         *,
         groups: Mapping[str, ArrayLike] | None = None,
     ) -> Self:
@@ -314,10 +315,10 @@ class Plate:
             A file that meshio reads, such as Gmsh's `.msh`; a mesh of meshio or PyVista; or points
             (n, 2) and cells (m, k) with points counted from 0.
         support : dict or str, optional
-            Supports by the names of groups of lines: ``"free"``, ``"soft"``, ``"simple"``,
-            ``"pinned"`` or ``"clamped"``. The group ``"boundary"`` has all sides of the outline and
-            of holes that are in no other group named here. A single support applies to this group.
-            A group that is named like a support has that support.
+            Supports by the names of groups of lines, as those of :meth:`rectangle`. The group
+            ``"boundary"`` has all sides of the outline and of holes that are in no other group
+            named here. A single support applies to this group. A group that is named like a support
+            has that support.
         groups : dict, optional
             Points of groups; only for a mesh of arrays.
 
@@ -350,4 +351,9 @@ class Plate:
         supports = {BOUNDARY: support} if isinstance(support, str) else support or {}
         if not isinstance(supports, Mapping):
             raise ObjectError(f"`support` is {support!r}, not a dictionary of groups")
-        return cls(plate.supports(supports), imported=plate)
+        named = {name: text for name, text in supports.items() if not is_elastic(text)}
+        elastic = {name: text for name, text in supports.items() if is_elastic(text)}
+        for name, text in elastic.items():
+            check_support(name, text)
+        plate.supports(dict.fromkeys(elastic, "free"))  # the groups exist
+        return cls({**plate.supports(named), **elastic}, imported=plate)

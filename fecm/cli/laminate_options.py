@@ -120,7 +120,7 @@ class LaminateOptions:
 def as_options(message: str, options: Collection[str]) -> str:
     """Return a message with options in place of the parameters that it quotes."""
     names = "|".join(options)
-    name = {"edges": "edge", "zones": "zone"}
+    name = {"edges": "edge", "zones": "zone", "masses": "mass-at"}
     return re.sub(f"`({names})`", lambda m: "--" + name.get(m[1], m[1]).replace("_", "-"), message)
 
 

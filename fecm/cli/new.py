@@ -15,9 +15,10 @@ from click.core import ParameterSource
 from fecm._files import check_outputs
 from fecm._text import printable
 from fecm.authoring.deck_options import AUTO, ImpactOptions
+from fecm.authoring.elastic_edges import FORM, SPRING
 from fecm.authoring.new_deck import author
 from fecm.authoring.parameters import ObjectError
-from fecm.authoring.plate import CUSTOM, FIXTURES, Plate, Support, Window
+from fecm.authoring.plate import CUSTOM, FIXTURES, Plate, Window
 from fecm.cli import new_values
 from fecm.cli.common import DASH, RefusedError, echo, echo_path, inform, note, write_text
 from fecm.cli.isolation import reads
@@ -28,7 +29,6 @@ from fecm.cli.options import (
     Finite,
     GroupedCommand,
     Parsed,
-    assignment,
     collected,
     groups_of,
     job_options,
@@ -71,8 +71,8 @@ class PlateOptions:
     grading: float
     columns: str
     rows: str
-    support: Support
-    edges: tuple[tuple[str, Support], ...]
+    support: str
+    edges: tuple[tuple[str, str], ...]
     fixture: str | None
     window: Window
     clamps: str | None
@@ -161,6 +161,7 @@ def _command_comment(arguments: Sequence[str], output: Path) -> str:
     patch={"default": "disc", "metavar": "PATCH"},
     shear_factor={"type": Parsed(new_values.shear_factor, "K|equi")},
     preload={"type": list_of("NX,NY[,NXY]", str, [2, 3])},
+    masses={"type": Parsed(new_values.mass_at, "X,Y:M[,J]")},
     zones={"type": Parsed(new_values.zone, "X0,Y0,X1,Y1:LAYUP")},
     projectile={
         "type": Parsed(new_values.projectile, "PROJECTILE"),
@@ -221,19 +222,22 @@ def _command_comment(arguments: Sequence[str], output: Path) -> str:
 )
 @option(
     "--support",
-    type=click.Choice(tuple(SUPPORTS)),
+    type=Parsed(new_values.support, "SUPPORT", (*SUPPORTS, f"{SPRING}:")),
     default="free",
     show_default=True,
-    help="Support of all edges: simple holds w and the rotation along the edge (a hard support), "
-    "soft holds w alone: frequencies of angle plies are up to 6 % lower.",
+    help=f"Support of all edges: {', '.join(SUPPORTS)}, or springs, {FORM}.  simple holds w and "
+    "the rotation along the edge (a hard support), soft holds w alone: frequencies of angle plies "
+    "are up to 6 % lower.  Springs have KR, moment per rotation across the edge and length, and "
+    "KW, force per length and deflection, also with units, as in spring:10kN,10N/mm^2; without KW "
+    "the edge also holds what simple does.",
 )
 @option(
     "--edge",
     "edges",
-    type=Parsed(assignment, "EDGE=SUPPORT"),
+    type=Parsed(new_values.edge, "EDGE=SUPPORT"),
     multiple=True,
-    help="Support of one edge: left, right, bottom or top, or a group of the mesh; may be "
-    "repeated.",
+    help="Support of one edge: left, right, bottom or top, or a group of the mesh, as in "
+    "left=clamped or left=spring:10kN; may be repeated.",
 )
 @option(
     "--fixture",

@@ -10,9 +10,11 @@ import click
 
 from fecm.authoring.contact import Sphere
 from fecm.authoring.deck_options import EQUI
+from fecm.authoring.elastic_edges import check_support
+from fecm.authoring.masses import PlacedMass
 from fecm.authoring.plate import MOST
 from fecm.authoring.zones import Zone
-from fecm.cli.options import POSITIVE, Finite, list_of
+from fecm.cli.options import POSITIVE, Finite, assignment, list_of
 from fecm.deck.catalogue import CONTACTS, NamedContact
 from fecm.deck.layup import parse_plies
 from fecm.deck.macros import RowsOfPlies
@@ -46,6 +48,28 @@ def contact(text: str) -> NamedContact | Sphere:
     if text not in CONTACTS:
         raise ValueError(f"{text!r} is not one of {', '.join(CONTACTS)}, {ESTIMATE}")
     return CONTACTS[text]
+
+
+def support(text: str) -> str:
+    """Check the support of all edges: a name, or springs."""
+    check_support("support", text)
+    return text
+
+
+def edge(text: str) -> tuple[str, str]:
+    """Parse the name of an edge or a group and its support; ``spring:KR,KW`` has a comma."""
+    name, support = assignment(text)
+    check_support(name, support)
+    return name, support
+
+
+def mass_at(text: str) -> PlacedMass:
+    """Parse the place of a point mass, the mass, and perhaps its rotary inertia."""
+    place, colon, values = text.partition(":")
+    texts = *place.split(","), *values.split(",")
+    if not colon or place.count(",") != 1 or len(texts) not in (3, 4) or not all(texts):
+        raise ValueError(f"{text!r} is not X,Y:M[,J], as in 20,30:5g")
+    return texts
 
 
 def mesh_of_text(text: str) -> tuple[int, int] | Path:

@@ -21,6 +21,7 @@ from fecm.deck.mesh_cards import (
     NodeCodes,
     NodeValues,
 )
+from fecm.deck.support_cards import LINE, Springs
 
 # Digits of coordinates, relative to the size of the plate: they must fit their columns.
 DIGITS = 6
@@ -56,7 +57,25 @@ IN_PLANE = {
     "tangential": EdgeCodes(along_x=(1, 0), along_y=(0, 1)),
     "free": EdgeCodes(along_x=(0, 0), along_y=(0, 0)),
 }
+# Restraints besides the supports that users name: an edge whose springs alone hold w.
+ON_SPRINGS = "on springs"
+RESTRAINTS = {**SUPPORTS, ON_SPRINGS: EdgeCodes(along_x=W_FREE, along_y=W_FREE)}
 EDGES = ("left", "right", "bottom", "top")
+
+
+class EdgeStiffness(NamedTuple):
+    """Stiffness of the springs along an edge, per length."""
+
+    w: float  # force/length^2
+    rotation: float  # of the rotation across the edge: moment per rotation and length
+
+    def along_x(self) -> tuple[float, ...]:
+        """Return the stiffness of the dofs on an edge along x."""
+        return (0.0, 0.0, self.w, 0.0, self.rotation)
+
+    def along_y(self) -> tuple[float, ...]:
+        """Return the stiffness of the dofs on an edge along y."""
+        return (0.0, 0.0, self.w, self.rotation, 0.0)
 
 
 def held_in_plane(support: str, in_plane: str) -> str:
@@ -266,7 +285,7 @@ class ElementGrid:
         for edge, support in supports.items():
             if support != "free":
                 held = IN_PLANE[held_in_plane(support, in_plane)]
-                codes[edge] = (*held.of(edge), *SUPPORTS[support].of(edge))
+                codes[edge] = (*held.of(edge), *RESTRAINTS[support].of(edge))
         return self.boundary(
             everywhere, codes, window, in_plane=in_plane, holds_w=holds_w, points=points
         )
@@ -305,6 +324,24 @@ class ElementGrid:
         of_nodes = codes.reshape(self.nodes, -1)
         of_nodes[np.array(points, dtype=int) - 1, 2] = 1
         return boundary_cards(of_nodes)
+
+    def springs(
+        self, edges: Mapping[str, EdgeStiffness], supports: Mapping[str, str]
+    ) -> Springs | None:
+        """Return SPRI LINE cards of the springs of edges; None without any stiffness."""
+        last_row = self.nodes - self.across + 1
+        ends = {
+            "left": (1, last_row),
+            "right": (self.across, self.nodes),
+            "bottom": (1, self.across),
+            "top": (last_row, self.nodes),
+        }
+        records = [
+            NodeValues(*ends[edge], k.along_y() if edge in ("left", "right") else k.along_x())
+            for edge, k in edges.items()
+            if any(k)
+        ]
+        return Springs(tuple(records), word=LINE) if records else None
 
     def window_lines(self, window: tuple[float, float]) -> list[tuple[int, int]]:
         """Return the nodes, from 1, at the ends of each side of a window in the middle."""

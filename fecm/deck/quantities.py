@@ -10,6 +10,7 @@ from typing import TypeGuard
 from fecm.deck.units import (
     COEFFICIENT,
     DENSITY,
+    INERTIA,
     MASS,
     MODULUS,
     VELOCITY,
@@ -30,6 +31,7 @@ EXAMPLES = {
     "force/length": "50N/mm",
     "length": "6mm",
     MASS: "5kg",
+    INERTIA: "2N*mm*s^2",
     MODULUS: "60MPa",
     DENSITY: "1600kg/m^3",
     COEFFICIENT: "4e4N/mm^1.5",

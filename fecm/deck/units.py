@@ -40,6 +40,7 @@ PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # Dimensions.
 MASS = "force*time^2/length"
+INERTIA = "force*length*time^2"  # of rotation
 MODULUS = "force/length^2"
 TOUGHNESS = "force/length"
 DENSITY = "force*time^2/length^4"

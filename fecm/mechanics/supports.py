@@ -124,6 +124,30 @@ class NodeSupports(NamedTuple):
         )
 
 
+def side_weights(ends: Indices, middle: Indices, lengths: Floats, numnp: int) -> Floats:
+    """Return the length that each node stands for on sides of elements, (numnp,).
+
+    These are the integrals of the shape functions along the sides.
+
+    Parameters
+    ----------
+    ends : ndarray of int (n, 2)
+        Nodes at the ends of each side, from 0.
+    middle : ndarray of int (n,)
+        Nodes in the middle; -1 for a side of two nodes.
+    lengths : ndarray (n,)
+        Lengths of the sides.
+    numnp : int
+        Number of nodes.
+    """
+    weights = np.zeros(numnp)
+    has_middle = middle >= 0
+    for corner in ends.T:
+        np.add.at(weights, corner, np.where(has_middle, lengths / 6.0, lengths / 2.0))
+    np.add.at(weights, middle[has_middle], lengths[has_middle] * 4.0 / 6.0)
+    return weights
+
+
 def one_sided(node: Indices, side: Floats, stiffness: Floats, gap: Floats) -> NodeSupports:
     """Return one-sided supports of w at nodes, from 0."""
     return NodeSupports(node, np.full(len(node), W), side, stiffness, gap)

@@ -19,12 +19,14 @@ from fecm._inputs import read_input
 from fecm._typing import Bools, Floats
 from fecm.deck.grid import (
     IN_PLANE,
+    RESTRAINTS,
     SUPPORTS,
+    EdgeStiffness,
     boundary_cards,
     held_in_plane,
     round_to,
 )
-from fecm.deck.model import Boundary, Control, Coordinates, Elements
+from fecm.deck.model import Boundary, Control, Coordinates, Elements, NodeValues, Springs
 from fecm.deck.reader import identify_program
 from fecm.mechanics.joints import (
     coincident,
@@ -33,6 +35,7 @@ from fecm.mechanics.joints import (
     representatives,
     sides_of_cells,
 )
+from fecm.mechanics.supports import side_weights
 from fecm.problem.abaqus_sets import (
     AbaqusSetError,
     abaqus_cards,
@@ -150,6 +153,12 @@ class PlateMesh:
         The support of the boundary leaves out the other groups. `in_plane` is the support of u and
         v. Raises MeshError if it depends on the direction of a side that is along neither x nor y.
         """
+        return boundary_cards(self._codes(everywhere, supports, in_plane))
+
+    def _codes(
+        self, everywhere: Sequence[int], supports: Mapping[str, str], in_plane: str
+    ) -> Integers:
+        """Return the restraint codes of all nodes, (nodes, 5); see :meth:`supported`."""
         codes = np.tile(np.array(everywhere), (self.nodes, 1))
         for name, support in supports.items():
             rows = self._group(name)
@@ -160,10 +169,10 @@ class PlateMesh:
                 continue
             sides, _, counts = _sides(self.cells)
             sides = sides[_inside(sides, counts, rows)]
-            along = np.ptp(self.points[sides], axis=1) <= SAME * np.ptp(self.points)
+            along = self._along_axes(sides)
             straight = len(sides) > 0 and bool(along.any(axis=1).all())
             lines = [np.unique(sides[along[:, axis]]) for axis in (1, 0)]  # along x, along y
-            bending = SUPPORTS[support]
+            bending = RESTRAINTS[support]
             everywhere_held = np.minimum(*bending)  # whatever the direction of the side
             if straight:
                 for on, code in zip(lines, bending, strict=True):
@@ -183,7 +192,55 @@ class PlateMesh:
                     )
                 for on, code in zip(lines, IN_PLANE[held], strict=True):
                     codes[on, :2] = np.maximum(codes[on, :2], code)
-        return boundary_cards(codes)
+        return codes
+
+    def springs(
+        self, groups: Mapping[str, EdgeStiffness], supports: Mapping[str, str]
+    ) -> Springs | None:
+        """Return SPRI cards of the nodes of groups with springs; None without any stiffness.
+
+        A node has the stiffness of the length that it stands for. Restrained dofs have none.
+        `supports` are those of all groups, as for :meth:`supported`. Raises MeshError if a group
+        has no sides, or springs of rotations on sides that are along neither x nor y.
+        """
+        total = np.zeros((self.nodes, 5))
+        ends, number, counts = _sides(self.cells[:, :4])
+        middle = np.full(len(ends), -1)
+        if self.most_nodes > 4:
+            middle[number] = self.cells[:, 4:8]
+        for name, stiffness in groups.items():
+            chosen = _inside(ends, counts, self._group(name))
+            if name == BOUNDARY and name not in self.groups:
+                for other in supports.keys() - {name}:
+                    chosen &= ~_inside(ends, counts, self._group(other))
+            if not chosen.any():
+                raise MeshError(f"no side of an element lies in {name!r}: it can't have springs")
+            along_y, along_x = self._along_axes(ends[chosen]).T
+            if stiffness.rotation and not (along_x | along_y).all():
+                raise MeshError(
+                    f"the sides of {name!r} are not all along x or y: they can have springs "
+                    "against w alone, spring:0,KW"
+                )
+            first, last = ends[chosen].T
+            between = np.where(middle[chosen] >= 0, middle[chosen], first)
+            lengths = sum(
+                np.hypot(*(self.points[b] - self.points[a]).T)
+                for a, b in ((first, between), (between, last))
+            )
+            for on, values in ((along_y, stiffness.along_y()), (~along_y, stiffness.along_x())):
+                parts = ends[chosen][on], middle[chosen][on], lengths[on]
+                total += np.outer(side_weights(*parts, self.nodes), values)
+        total[self._codes((0,) * 5, supports, "free") != 0] = 0.0
+        (rows,) = np.nonzero(total.any(axis=1))
+        cards = [
+            NodeValues(row + 1, 0, tuple(float(f"{k:.6g}") for k in total[row].tolist()))
+            for row in rows.tolist()
+        ]
+        return Springs(tuple(cards)) if cards else None
+
+    def _along_axes(self, sides: Integers) -> Bools:
+        """Return whether the x, and the y, of the nodes of sides are equal, (sides, 2)."""
+        return np.asarray(np.ptp(self.points[sides], axis=1) <= SAME * np.ptp(self.points))
 
     def _group(self, name: str) -> Integers:
         if name in self.groups or name != BOUNDARY:

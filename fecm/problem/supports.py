@@ -28,7 +28,7 @@ from fecm.mechanics.interpolation import NDOF, W
 from fecm.mechanics.joints import sides_of
 from fecm.mechanics.mesh import MeshArrays, element_blocks, extent
 from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.supports import NodeSupports, one_sided
+from fecm.mechanics.supports import NodeSupports, one_sided, side_weights
 from fecm.mechanics.time_step import safe_time_step
 from fecm.problem.generate import node_values
 
@@ -87,11 +87,7 @@ def line_weights(mesh: MeshArrays, first: int, last: int) -> tuple[Indices, Floa
     sizes = np.abs(np.diff(position[keys[:, :2]], axis=1)[:, 0])
     if abs(sizes.sum() - length) > near:
         raise NoLineError(f"element sides do not cover the line from node {first} to {last}")
-    weights = np.zeros(len(places))
-    has_middle = keys[:, 2] >= 0
-    for corner in keys[:, :2].T:
-        np.add.at(weights, corner, np.where(has_middle, sizes / 6.0, sizes / 2.0))
-    np.add.at(weights, keys[has_middle, 2], sizes[has_middle] * 4.0 / 6.0)
+    weights = side_weights(keys[:, :2], keys[:, 2], sizes, len(places))
     (nodes,) = np.nonzero(weights)
     return nodes, weights[nodes]
 

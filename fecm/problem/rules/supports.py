@@ -13,8 +13,9 @@ from fecm.mechanics.interpolation import W
 from fecm.mechanics.solutions import ConvergenceError, StaticResponse
 from fecm.mechanics.time_step import safe_time_step
 from fecm.problem.estimates import MOST_SOLVED
+from fecm.problem.generate import node_values
 from fecm.problem.problem import Problem
-from fecm.problem.supports import NoLineError, line_weights, one_sided_rows, spring_stiffness
+from fecm.problem.supports import NoLineError, line_weights, one_sided_rows
 
 LARGEST_GAP = 0.5  # of the thickness, beyond which a gap is doubted
 LARGEST_GAIN = 0.005  # of flexibility by the stiffness of the supports
@@ -113,16 +114,26 @@ def support_of_restrained_w(problem: Problem) -> Reports:
 def spring_of_restrained_dof(problem: Problem) -> Reports:
     """A spring is at a restrained unknown, where it is without effect.
 
+    A line may have restrained nodes, as at the corner of two edges, but not only such nodes.
+
     Remedy: Remove the restraint from BOUN, or the spring.
     """
-    if not problem.deck.has(model.Springs):
-        return
-    springs = spring_stiffness(problem.deck, problem.mesh)
-    nodes = np.flatnonzero(((springs > 0.0) & (problem.mesh.codes != 0)).any(axis=1))
-    if len(nodes):
-        more = f" (and {len(nodes) - 1} more)" if len(nodes) > 1 else ""
-        message = f"A spring of node {nodes[0] + 1}{more} is at a restrained unknown: no effect."
-        yield Report(message, problem.deck.require(model.Springs).place())
+    held = problem.mesh.codes != 0
+    for segment in problem.deck.all(model.Springs):
+        if segment.is_of_lines:
+            for card in segment.records:
+                nodes, _ = line_weights(problem.mesh, card.node, card.increment)
+                if (held[nodes].all(axis=0) & (np.array(card.values) > 0.0)).any():
+                    ends = f"from node {card.node} to {card.increment}"
+                    message = f"A spring {ends} is at a restrained unknown: no effect."
+                    yield Report(message, card.place())
+            continue
+        springs = node_values(segment.records, held.shape)
+        rows = np.flatnonzero(((springs > 0.0) & held).any(axis=1))
+        if len(rows):
+            more = f" (and {len(rows) - 1} more)" if len(rows) > 1 else ""
+            message = f"A spring of node {rows[0] + 1}{more} is at a restrained unknown: no effect."
+            yield Report(message, segment.place())
 
 
 @rule("W576", Subject.MESH)
