@@ -148,7 +148,7 @@ def deck(case: Case, mesh: tuple[int, int], grading: float, duration: float) -> 
         )
     options: dict[str, Any] = {"kinematics": "linear"} | case.options
     return fecm.impact(
-        fecm.Plate.rectangle(case.size, mesh, support=case.support, grading=grading),  # type: ignore[arg-type]
+        fecm.Plate.rectangle(case.size, mesh, support=case.support, grading=grading),
         laminate,
         fecm.RigidMass(case.mass),
         fecm.Contact.estimate(radius=case.ball),

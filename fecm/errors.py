@@ -32,6 +32,7 @@ from fecm.plot.kinds import LackingError, MatplotlibError, PlotError
 from fecm.problem.estimates import NoCurveError
 from fecm.problem.plate_mesh import MeshError
 from fecm.problem.refine import RefineError
+from fecm.problem.supports import NoLineError
 from fecm.report.content import Jinja2Error, ReportError
 from fecm.results.diff import IncomparableError
 from fecm.results.groups import ExportError, NotStoredError, ResultWriteError
@@ -64,6 +65,7 @@ __all__ = [
     "MeshError",
     "NoCurveError",
     "NoFolderError",
+    "NoLineError",
     "NotEnoughMemoryError",
     "NotStoredError",
     "ObjectError",

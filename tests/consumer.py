@@ -182,7 +182,7 @@ fecm.sweep(deck, {"k": [1e6]}, executor=2)  # type: ignore[arg-type]  # pyright:
 result.export("plate.vtu", to="vtu")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.diff(deck, result)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.runn("plate.inp")  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]
-fecm.Plate.from_mesh("plate.msh", {"rim": "glued"})  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
+fecm.Plate.from_mesh("plate.msh", {"rim": 5})  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
 fecm.run_one(deck, law=TwoMasses())  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.run_one(deck, projectile=law)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.run_one(deck, criteria=[law])  # type: ignore[list-item]  # pyright: ignore[reportArgumentType]

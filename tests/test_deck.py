@@ -155,6 +155,8 @@ def test_every_segment_of_the_listing_is_read() -> None:
 
 def test_every_kind_of_segment_is_read_by_its_keyword() -> None:
     kinds = {*Segment.__subclasses__(), *NumberedSegment.__subclasses__()} - {NumberedSegment}
+    kinds |= {kind for group in kinds for kind in group.__subclasses__()}
+    kinds = {kind for kind in kinds if kind.keyword}
     assert {keyword: kind for keyword, kind in SEGMENTS.items() if keyword != "NOPR"} == {
         kind.keyword: kind for kind in kinds
     }

@@ -310,7 +310,7 @@ def test_the_likely_unit_is_that_of_a_usual_value(value: float, usual: float, un
 def strip(thickness: float, **supports: str) -> list[Finding]:
     """Findings about the thickness of a strip of 200 x 40."""
     deck = fecm.impact(
-        fecm.Plate.rectangle((200, 40), (10, 4), edges=supports),  # type: ignore[arg-type]
+        fecm.Plate.rectangle((200, 40), (10, 4), edges=supports),
         fecm.Laminate("[0/90]2s", "IM7/8552", thickness / 8.0),
         fecm.RigidMass(1e-3),
         fecm.Contact(4e4, 0.0, 0.0, 1.5),

@@ -207,7 +207,7 @@ def test_a_sweep_of_a_deck_with_over_knows_what_its_runs_know() -> None:
 def test_a_new_deck_without_a_duration_ends_by_itself() -> None:
     def deck(support: str, mass: float) -> Deck:
         return fecm.impact(
-            fecm.Plate.rectangle((100, 80), (4, 4), support=support),  # type: ignore[arg-type]
+            fecm.Plate.rectangle((100, 80), (4, 4), support=support),
             fecm.Laminate("[0/90]2s", "T300/5208", 0.25),
             fecm.RigidMass(mass),
             fecm.Contact.estimate(radius=8),

@@ -404,7 +404,7 @@ def test_a_threshold_without_sense_is_refused(result: Result, value: Any) -> Non
 def test_a_picture_names_the_macro_that_stores_what_it_lacks(kind: str) -> None:
     result = run(small("LMAS\nDT        .5E-6\n"))
     stores = dict.fromkeys(("line", "contour", "surface", "animation"), "DISP")
-    macro = {**stores, "thickness": "PLYS", "failure": "FAIL"}.get(kind, "RODP")
+    macro = {**stores, "thickness": "PLYS", "failure": "FAIL", "modes": "EIGE"}.get(kind, "RODP")
     with pytest.raises(PlotError, match=f"bare has no .*; add {macro} to"):
         draw(kind, {"bare": result})
 

@@ -27,6 +27,7 @@ pytest.importorskip("matplotlib")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Result file of the small plate under a patch, with ply stresses and exposures."""
     program = PLY_PROGRAM.replace("NEXT", "FAIL          5\nNEXT")
+    program = program.replace("LMAS\n", "LMAS\nEIGE          2\n")
     data = "ALLO\n200000,200000,7000,28000,13000\n\n" + DISC + DATA_CARDS
     path = tmp_path_factory.mktemp("made") / "small.h5"
     fecm.run(small(program, data=data), output=path)

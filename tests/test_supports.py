@@ -152,12 +152,12 @@ def test_stiff_springs_are_restraints_and_supports_that_stay_closed_are_springs(
     assert contact is not None
     # A load on the whole window closes every support of the window.
     soft = replace(
-        plate, supports=plate.supports._replace(stiffness=0.0 * plate.supports.gap + 1.0)
+        plate, supports=replace(plate.supports, stiffness=0.0 * plate.supports.gap + 1.0)
     )
     assert soft.supports is not None
     over_window = np.zeros_like(contact)
     over_window[soft.supports.node, 2] = 1.0 / len(soft.supports.node)
-    one_sided = replace(soft, supports=soft.supports._replace(side=soft.supports.gap + 1.0))
+    one_sided = replace(soft, supports=replace(soft.supports, side=soft.supports.gap + 1.0))
     assert static_response(one_sided, over_window).compliance == pytest.approx(
         static_response(soft, over_window).compliance, rel=1e-12
     )

@@ -275,8 +275,9 @@ def static_response(plate: PlateModel, contact: Floats) -> StaticResponse:
     G, c = Z[dofs], u[dofs]
     is_open = np.zeros(len(dofs), dtype=bool)
     for _ in range(MOST_ACTIVE_SETS):
-        resistance = np.diag(1.0 / stiffness[is_open]) - G[np.ix_(is_open, is_open)]
-        if not _is_positive_definite(resistance):
+        compliances = 1.0 / stiffness[is_open]
+        resistance = np.diag(compliances) - G[np.ix_(is_open, is_open)]
+        if not _resists(resistance, compliances):
             raise SingularStiffnessError("the plate tips off its one-sided supports")
         opened = np.linalg.solve(resistance, c[is_open])
         opens = side * (c + G[:, is_open] @ opened) < 0.0
@@ -298,12 +299,16 @@ def _distinct(keys: Floats) -> tuple[tuple[Indices, Floats], Indices]:
     return (pairs[:, 0].astype(np.intp), pairs[:, 1]), which.ravel()
 
 
-def _is_positive_definite(matrix: Floats) -> bool:
+def _resists(resistance: Floats, compliances: Floats) -> bool:
+    """Return whether a plate without the opened supports is held: 1/k - G is positive definite.
+
+    A pivot far below the compliance 1/k of its support is rounding: the plate is then free to tip.
+    """
     try:
-        np.linalg.cholesky(matrix)
+        factor = np.linalg.cholesky(resistance)
     except np.linalg.LinAlgError:
         return False
-    return True
+    return bool((np.diagonal(factor) ** 2 > NOT_HELD * compliances).all())
 
 
 def compliance(plate: PlateModel, contact: Floats) -> float:

@@ -15,7 +15,7 @@ r g, the excess work; the quadratic strains of a nonlinear plate have one too (s
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,7 +23,8 @@ from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.interpolation import W
 
 
-class NodeSupports(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class NodeSupports:
     """Springs and one-sided supports, (n,) each.
 
     Attributes
@@ -51,16 +52,21 @@ class NodeSupports(NamedTuple):
 
     def select(self, rows: Bools) -> NodeSupports:
         """Return the supports of a mask, (n,)."""
-        node, dof, side, stiffness, gap = self
-        return NodeSupports(node[rows], dof[rows], side[rows], stiffness[rows], gap[rows])
+        return NodeSupports(
+            self.node[rows],
+            self.dof[rows],
+            self.side[rows],
+            self.stiffness[rows],
+            self.gap[rows],
+        )
 
     def held(self) -> NodeSupports:
         """Return the supports as springs: all one-sided supports are closed."""
-        return self._replace(side=np.zeros_like(self.side), gap=np.zeros_like(self.gap))
+        return replace(self, side=np.zeros_like(self.side), gap=np.zeros_like(self.gap))
 
     def without_gaps(self) -> NodeSupports:
         """Return the supports without their gaps."""
-        return self._replace(gap=np.zeros_like(self.gap))
+        return replace(self, gap=np.zeros_like(self.gap))
 
     def joined(self, other: NodeSupports) -> NodeSupports:
         """Return these supports and others."""
@@ -115,12 +121,13 @@ class NodeSupports(NamedTuple):
         `images` (numnp,) are the images of the nodes. w keeps its sign, and so do the sides.
         """
         order = np.lexsort((self.gap, self.stiffness, self.side, self.dof, self.node))
-        turned = self._replace(node=images[self.node])
+        turned = replace(self, node=images[self.node])
         image_order = np.lexsort(
             (turned.gap, turned.stiffness, turned.side, turned.dof, turned.node)
         )
         return all(
-            np.array_equal(a[order], b[image_order]) for a, b in zip(self, turned, strict=True)
+            np.array_equal(getattr(self, name)[order], getattr(turned, name)[image_order])
+            for name in ("node", "dof", "side", "stiffness", "gap")
         )
 
 

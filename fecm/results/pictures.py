@@ -23,6 +23,7 @@ RunKind = Literal[
     "contour",
     "surface",
     "mesh",
+    "modes",
     "animation",
 ]
 # Kinds of pictures of a sweep; exceedance, sensitivity and scatter are for random sweeps.
