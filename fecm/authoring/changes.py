@@ -125,6 +125,11 @@ class Values(TypedDict, total=False):
     cure_dT: Number
     size: str | Iterable[float | str]
     support: Support
+    edge_kr: Number
+    edge_kw: Number
+    clamp_k: Number
+    window_k: Number
+    gap: Number
     dt: Number
     duration: Number
 

@@ -17,6 +17,7 @@ import numpy as np
 from fecm._errors import did_you_mean
 from fecm.authoring import plate_values as plate
 from fecm.authoring import strike_values as strike
+from fecm.authoring import support_values as supports
 from fecm.authoring.case import (
     PAIRS,
     Case,
@@ -189,6 +190,18 @@ PLATE_VALUES: tuple[SweepValue[PlateSetter], ...] = (
     SweepValue("support", Changes.PLATE, "", plate.set_support, ValueKind.TEXT,
              meaning="`free`, `simple`, `pinned` or `clamped`: [support](#supports-of-the-outline) "
                      "of the outline"),
+    SweepValue("edge_kr", Changes.PLATE, "", supports.set_edge_rotation,
+             meaning="factor of the stiffness of the rotations on all `SPRI LINE` "
+                     "([elastic edges](supports.md#elastic-edges))"),
+    SweepValue("edge_kw", Changes.PLATE, "", supports.set_edge_w,
+             meaning="factor of the stiffness of w on all `SPRI LINE`"),
+    SweepValue("clamp_k", Changes.PLATE, "force/length", supports.set_clamp,
+             meaning="stiffness of w of the `SPRI` at nodes, as the clamps of a fixture"),
+    SweepValue("window_k", Changes.PLATE, _STRESS, supports.set_window,
+             meaning="stiffness per length of `UNIL LINE`, as the window that pushes; 0 is the "
+                     "default"),
+    SweepValue("gap", Changes.PLATE, "length", supports.set_gap,
+             meaning="gap of all one-sided supports (`UNIL`)"),
 )
 TIME_VALUES: tuple[SweepValue[None], ...] = (  # set together, after all other values
     SweepValue("dt", Changes.TIME, "time", None,
