@@ -9,6 +9,7 @@ import pytest
 from scipy.special import ellipk
 
 from fecm import ContactPoint
+from fecm.mechanics import reduced_plate as reduction
 from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
 from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.membrane import MembraneForces
@@ -26,6 +27,7 @@ from fecm.mechanics.reduced_plate import (
 )
 from fecm.mechanics.solutions import Tangent, modes, static_stiffness
 from fecm.mechanics.strains import FLAT, Curvature
+from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 from tests.builders import (
     Floats,
     boundary,
@@ -142,11 +144,42 @@ def test_a_central_load_finds_no_mode_that_it_does_not_move() -> None:
     assert (np.diff(np.sort(actual.stiffness)) > 1e-6 * actual.stiffness.max()).all()
 
 
+@pytest.mark.parametrize("held", [True, False])
+@pytest.mark.parametrize("lam", [isotropic_plate(THICKNESS), general_plate()])
+def test_half_of_a_plate_that_a_half_turn_maps_onto_itself_gives_the_modes_of_the_whole(
+    lam: LaminateSection, held: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plate = on_square(lam, held=held)
+    oblong = plate.mesh.coordinates * (1.0, 0.73)  # no two modes of equal frequency
+    plate = replace(plate, mesh=replace(plate.mesh, coordinates=oblong))
+    contact = patch_on(plate, 0.5, 0.365)
+    half = reduced_plate(plate, contact, 4)
+    seen: list[PlateModel] = []
+
+    def whole_plate(model: PlateModel, _: Floats | None) -> SymmetryReduction:
+        seen.append(model)
+        return unreduced(model)
+
+    monkeypatch.setattr(reduction, "symmetry_reduction", whole_plate)
+    whole = reduced_plate(plate, contact, 4)
+    assert seen
+    assert half.bending == whole.bending == 4
+    # Membrane modes have either sign.
+    assert half.stiffness == pytest.approx(whole.stiffness, rel=1e-9)
+    for name in ("deflection", "quartic", "flexibility"):
+        wanted = getattr(whole, name)
+        atol = 1e-7 * np.abs(wanted).max()
+        np.testing.assert_allclose(getattr(half, name), wanted, rtol=0.0, atol=atol, err_msg=name)
+    atol = 1e-7 * np.abs(whole.cubic).max()
+    np.testing.assert_allclose(np.abs(half.cubic), np.abs(whole.cubic), rtol=0.0, atol=atol)
+
+
 def test_modes_of_equal_frequency_are_the_one_that_moves() -> None:
-    turned, _ = np.linalg.qr(np.random.default_rng(5).standard_normal((5, 5)))
-    inverse = turned @ np.diag([3.0, 2.0, 2.0, 2.0 - 1e-11, 1.0]) @ turned.T
+    diagonal = np.array([3.0, 2.0, 2.0, 2.0 - 1e-11, 1.0])
+    beside = np.array([0.0, 1e-11, 1e-12, 0.0])
+    inverse = np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1)
     load = np.array([1.0, -2.0, 0.5, 3.0, 1.5])
-    values, vectors = _moved_eigenvectors(inverse, load)
+    values, vectors = _moved_eigenvectors(diagonal, beside, load)
     assert values == pytest.approx([3.0, 2.0, 1.0])
     assert inverse @ vectors == pytest.approx(vectors * values, abs=1e-9)
     # Together they move as far as all modes, and none of equal frequency is left to move.

@@ -44,7 +44,7 @@ central difference of a vibration is sin(omega dt)/(omega dt) times the velocity
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -60,7 +60,12 @@ from fecm.mechanics.membrane import BLOCK, TYING, QuadraticStrains
 from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.solutions import SingularStiffnessError, Tangent, rigid_in_plane
-from fecm.mechanics.symmetry import with_codes
+from fecm.mechanics.symmetry import (
+    SymmetryReduction,
+    symmetry_reduction,
+    unreduced,
+    with_codes,
+)
 
 # Residual of a converged mode relative to its eigenvalue; the error of the frequency is its square.
 CONVERGED = 1e-6
@@ -159,24 +164,27 @@ def reduced_plate(
 
     Raises ReductionError if the plate is not held, or if its modes do not converge.
     """
-    bending = bending_modes(plate, contact, count)
+    turn = _at_rest(plate, contact)
+    bending = _bending_modes(plate, turn, contact, count)
     plane = _free_in_plane(plate)
-    pairs = _integrated(plate, plane, bending.shapes)
+    # Modes that a half turn maps onto themselves have quadratic strains that it maps likewise.
+    in_plane = symmetry_reduction(plane, None) if turn.is_half else unreduced(plane)
+    pairs = _integrated(plate, in_plane, bending.shapes)
     cubic, quartic = pairs.cubic, pairs.quartic
     stiffness, deflection = [bending.stiffness], [bending.deflection]
     if plane.neq:
-        tangent = Tangent(plane)
+        tangent = Tangent(plane, reduction=in_plane)
         quartic -= pairs.loads.T @ tangent.solve(pairs.loads)
         first, second = np.triu_indices(len(bending.stiffness))
         static = bending.deflection / bending.stiffness
         membrane = _moved_modes(
             tangent,
-            plane.mass,
+            _independent_mass(plane, in_plane, plane.mass),
             pairs.loads @ (static[first] * static[second]),
             MEMBRANE_MODES,
             least=MEMBRANE_SHARE,
             stiffest=MEMBRANE_FASTEST**2 * bending.stiffness.max(),
-            rigid=rigid_in_plane(plane),
+            rigid=rigid_in_plane(plane, in_plane),
         )
         rows = membrane.shapes.T @ pairs.loads
         quartic += (rows.T / membrane.stiffness) @ rows
@@ -203,13 +211,37 @@ def bending_modes(plate: PlateModel, contact: Floats, count: int) -> ReducedMode
     The masses are lumped.  The masses of u and v are left out, so that u and v follow statically.
     Raises ReductionError if the plate is not held.
     """
-    free = plate.mesh.equations > 0
+    return _bending_modes(plate, _at_rest(plate, contact), contact, count)
+
+
+def _at_rest(plate: PlateModel, contact: Floats) -> SymmetryReduction:
+    """Return the dofs that move independently in small motions about the plate at rest."""
+    return symmetry_reduction(replace(plate, nonlinear=False), contact)
+
+
+def _bending_modes(
+    plate: PlateModel, reduction: SymmetryReduction, contact: Floats, count: int
+) -> ReducedModes:
+    """Compute the modes of :func:`bending_modes` in the independent dofs."""
     mass = plate.field(plate.mass, 0.0)
     mass[:, :2] = 0.0
+    free = plate.mesh.equations > 0
     try:
-        return _moved_modes(Tangent(plate), mass[free], contact[free], count)
+        found = _moved_modes(
+            Tangent(plate, reduction=reduction),
+            _independent_mass(plate, reduction, mass[free]),
+            reduction.gather(contact),
+            count,
+        )
     except SingularStiffnessError as error:
         raise ReductionError(f"a reduced model needs a plate that is held: {error}") from None
+    shapes = [reduction.field(shape)[free] for shape in found.shapes.T]
+    return found._replace(shapes=np.stack(shapes, axis=1))
+
+
+def _independent_mass(plate: PlateModel, reduction: SymmetryReduction, mass: Floats) -> Floats:
+    """Sum the masses (neq,) over the dofs that follow each independent one."""
+    return reduction.gather(reduction.sign * plate.field(mass, 0.0))
 
 
 def _moved_modes(
@@ -224,11 +256,13 @@ def _moved_modes(
 ) -> ReducedModes:
     """Find up to `count` modes with the largest shares in the displacement under a load, (neq,).
 
-    Modes whose share is below `least`, or whose squared angular frequency exceeds `stiffest`, are
-    left out.  `rigid` (motions, neq) are motions without strain, on which the load does no work.
+    Vectors are those of the tangent's independent dofs.  Modes whose share is below `least`, or
+    whose squared angular frequency exceeds `stiffest`, are left out.  `rigid` (motions, neq) are
+    motions without strain, on which the load does no work.
 
     Lanczos iteration with K^-1 M, starting from the static displacement, finds the modes in the
     order of their shares.  Among modes of equal frequency it finds the mode that the load moves.
+    Products of a matrix and a vector are sums by einsum: BLAS would wake threads for each.
     """
     static = tangent.solve(load)
     compliance = float(load @ static)
@@ -241,22 +275,24 @@ def _moved_modes(
         VECTORS_PER_MODE * count + MORE_VECTORS, int(np.count_nonzero(mass)) - rigid_count
     )
     basis = np.concatenate([fixed, np.empty((largest_size, len(mass)))])
-    inverse = np.zeros((largest_size, largest_size))  # K^-1 M in the basis
+    diagonal, beside = np.zeros((2, largest_size))  # K^-1 M in the basis is tridiagonal
     vector, _ = _orthogonalised(static, fixed, mass)
     before = np.empty(0)
     for size in range(1, largest_size + 1):
         last, krylov = rigid_count + size - 1, basis[rigid_count : rigid_count + size]
         basis[last] = vector / _norm(vector, mass)
-        vector = tangent.solve(mass * basis[last])
+        vector = tangent.approximate(mass * basis[last])
         norm_before = _norm(vector, mass)
         vector, parts = _orthogonalised(vector, basis[: last + 1], mass)
-        inverse[:size, size - 1] = parts[rigid_count:]
+        diagonal[size - 1] = parts[-1]
         norm_left = _norm(vector, mass)
+        beside[size - 1] = norm_left
         is_exhausted = norm_left <= EXHAUSTED * norm_before
         if not is_exhausted and size < largest_size and (size < count or size % LOOK):
             continue
-        values, vectors = _moved_eigenvectors(inverse[:size, :size], krylov @ load)
-        deflections = vectors.T @ (krylov @ load)
+        loads = np.einsum("ij,j", krylov, load)
+        values, vectors = _moved_eigenvectors(diagonal[:size], beside[: size - 1], loads)
+        deflections = np.einsum("ij,i", vectors, loads)
         shares = deflections**2 * values
         error = norm_left * np.abs(vectors[-1])
         is_unconverged = (error > CONVERGED * values) & (shares > UNMOVED * compliance)
@@ -296,15 +332,18 @@ def _moved_modes(
     raise ReductionError(f"{count} modes did not converge; take fewer")
 
 
-def _moved_eigenvectors(inverse: Floats, load: Floats) -> tuple[Floats, Floats]:
+def _moved_eigenvectors(diagonal: Floats, beside: Floats, load: Floats) -> tuple[Floats, Floats]:
     """Return eigenvalues and eigenvectors of K^-1 M in the basis, by ascending frequency.
 
-    `load` are the parts of the load along the basis.  Among modes of equal frequency only the mode
-    that the load moves is kept; rounding adds the other modes to the Krylov space.
+    The matrix is tridiagonal, `beside` are the numbers beside its diagonal.  `load` are the parts
+    of the load along the basis.  Among modes of equal frequency only the mode that the load moves
+    is kept; rounding adds the other modes to the Krylov space.
     """
-    values, vectors = np.linalg.eigh(inverse, UPLO="U")
+    from scipy.linalg import eigh_tridiagonal  # 0.1 s, which most runs don't need
+
+    values, vectors = eigh_tridiagonal(diagonal, beside)
     values, vectors = values[::-1], vectors[:, ::-1]
-    deflections = vectors.T @ load
+    deflections = np.einsum("ij,i", vectors, load)
     starts = np.flatnonzero(np.append(True, values[1:] < (1.0 - EQUAL) * values[:-1]))
     combined = np.add.reduceat(deflections * vectors, starts, axis=1)
     size = np.sqrt(np.add.reduceat(deflections**2, starts))
@@ -318,14 +357,14 @@ def _orthogonalised(vector: Floats, basis: Floats, mass: Floats) -> tuple[Floats
     """
     total = np.zeros(len(basis))
     for _ in range(2):  # Gram-Schmidt, twice for orthogonality to rounding
-        parts = basis @ (mass * vector)
-        vector = vector - parts @ basis
+        parts = np.einsum("ij,j", basis, mass * vector)
+        vector = vector - np.einsum("i,ij", parts, basis)
         total += parts
     return vector, total
 
 
 def _norm(vector: Floats, mass: Floats) -> float:
-    return float(np.sqrt(vector @ (mass * vector)))
+    return float(np.sqrt(np.einsum("i,i,i", vector, vector, mass)))
 
 
 # Pairs of modes -----------------------------------------------------------------------------------
@@ -336,7 +375,7 @@ class Pairs(NamedTuple):
 
     cubic: Floats  # (m, pairs): int N_i eps_q
     quartic: Floats  # (pairs, pairs): int eps_q A eps_q, u and v held
-    loads: Floats  # (neq of the membrane, pairs): r
+    loads: Floats  # (independent dofs of the membrane, pairs): r
 
 
 def _free_in_plane(plate: PlateModel) -> PlateModel:
@@ -353,24 +392,28 @@ def bytes_of_pairs(plate: PlateModel, neq: int, modes: int) -> int:
     return 8 * count * (3 * neq + 4 * elements * 3 * len(plate.rules.bending.xi))
 
 
-def _integrated(plate: PlateModel, plane: PlateModel, shapes: Floats) -> Pairs:
-    """Integrate the quadratic strains over all pairs of the modes, (neq, m)."""
+def _integrated(plate: PlateModel, in_plane: SymmetryReduction, shapes: Floats) -> Pairs:
+    """Integrate the quadratic strains over all pairs of the modes, (neq, m).
+
+    `in_plane` are the independent dofs of the membrane, and the elements that stand for others.
+    """
     from scipy import sparse  # 0.16 s, which most runs don't need
 
     modes = shapes.shape[1]
     count = modes * (modes + 1) // 2
-    require_memory(bytes_of_pairs(plate, plane.neq, modes), "the reduced model of the plate")
+    require_memory(bytes_of_pairs(plate, in_plane.count, modes), "the reduced model of the plate")
     fields = np.stack([plate.field(shape, 0.0) for shape in shapes.T], axis=2)  # (numnp, 5, m)
     cubic, quartic = np.zeros((modes, count)), np.zeros((count, count))
-    loads = np.zeros((plane.neq, count))
+    loads = np.zeros((in_plane.count, count))
     for family in plate.families:
         laminate = plate.laminate_of(family)
-        for block in family.blocks(BLOCK):
+        represented = family.take(np.flatnonzero(in_plane.weights[family.rows]))
+        for block in represented.blocks(BLOCK):
             strains = _pair_strains(plate, block, fields[block.nodes, 2])
             basis = interpolate(block, plate.rules.bending)
             linear = membrane_and_bending(basis, plate.curvature)  # (ne, points, 6, 5 nodes)
             ne, nodes = block.nodes.shape
-            weight = basis.jxw[:, :, None, None]
+            weight = (in_plane.weights[block.rows, None] * basis.jxw)[:, :, None, None]
             stresses = _rows(weight * (laminate.A @ strains))
             quartic += _rows(strains).T @ stresses
             if laminate.is_coupled or plate.is_curved:
@@ -379,10 +422,11 @@ def _integrated(plate: PlateModel, plane: PlateModel, shapes: Floats) -> Pairs:
                 cubic += _rows(weight * (AB @ (linear @ mode_values))).T @ _rows(strains)
             B = linear.reshape(ne, -1, 6, nodes, NDOF)[:, :, :3, :, :2].reshape(ne, -1, 2 * nodes)
             forces = B.transpose(0, 2, 1) @ stresses.reshape(ne, -1, count)
-            numbers = plane.mesh.equations[block.nodes][:, :, :2].ravel()
-            moving = np.flatnonzero(numbers > 0)
-            places = (numbers[moving] - 1, moving)
-            sums = sparse.csr_array((np.ones(len(moving)), places), (plane.neq, len(numbers)))
+            numbers = in_plane.index[block.nodes, :2].ravel()
+            signs = in_plane.sign[block.nodes, :2].ravel()
+            moving = np.flatnonzero(signs)
+            places = (numbers[moving], moving)
+            sums = sparse.csr_array((signs[moving], places), (in_plane.count, len(numbers)))
             loads += sums @ _rows(forces)
     return Pairs(cubic, quartic, loads)
 

@@ -46,6 +46,8 @@ MOST_ACTIVE_SETS = 50  # of one-sided supports; up to 19 were seen
 # Squares of frequencies up to it are rounding errors, relative to the largest ratio of diagonal
 # entries of K and M; those of rigid motions are below 1e-17.
 RIGID = 1.0e-15
+# Loads that are solved together.
+LOADS = 4
 # A rigid motion is free if its eigenvalue, relative to the largest, is smaller.
 NOT_HELD = 1.0e-9
 
@@ -97,15 +99,24 @@ def _in_plane_motions(plate: PlateModel) -> Floats:
     return motions
 
 
-def rigid_in_plane(plate: PlateModel) -> Floats:
-    """Return the rigid motions in the plane that supports leave free, (motions, neq)."""
+def rigid_in_plane(plate: PlateModel, reduction: SymmetryReduction) -> Floats:
+    """Return the rigid motions in the plane that supports and symmetry leave free.
+
+    Returns the displacements of the independent dofs, (motions, neq).
+    """
     motions = _in_plane_motions(plate)
     restrained = motions[plate.mesh.equations[:, :2] == 0]
     values, vectors = np.linalg.eigh(restrained.T @ restrained)
     fields = np.zeros((*plate.mesh.equations.shape, 3))
     fields[:, :2] = motions @ vectors
     free = values <= NOT_HELD * values[-1]
-    return np.asarray(fields[plate.mesh.equations > 0].T[free])
+    followers = reduction.gather(reduction.sign)
+    symmetric = [reduction.gather(fields[:, :, n]) / followers for n in np.flatnonzero(free)]
+    if not symmetric:
+        return np.empty((0, reduction.count))
+    # The half turn leaves the rotation alone, and the motions may be sums of it and translations.
+    _, sizes, motions = np.linalg.svd(np.array(symmetric), full_matrices=False)
+    return np.asarray(motions[sizes > NOT_HELD * np.sqrt(reduction.count)])
 
 
 def in_plane_pins(plate: PlateModel, reduction: SymmetryReduction | None = None) -> list[int]:
@@ -160,10 +171,10 @@ def factorised(matrix: sparse.csr_array) -> SuperLU:
 class Tangent:
     """Factorised stiffness about a field.
 
-    Loads and displacements, (neq,), are those of the independent dofs of a reduction by symmetry,
-    and of all equations without one.  With `held` all one-sided supports are closed.  Rigid motions
-    in the plane are pinned, so that they need no supports.  Raises SingularStiffnessError if the
-    stiffness is singular.
+    Loads and displacements, (neq,), or (neq, loads) of many, are those of the independent dofs of a
+    reduction by symmetry, and of all equations without one.  With `held` all one-sided supports are
+    closed.  Rigid motions in the plane are pinned, so that they need no supports.  Raises
+    SingularStiffnessError if the stiffness is singular.
     """
 
     def __init__(
@@ -186,8 +197,15 @@ class Tangent:
         self._factors = factorised(pinned)
 
     def approximate(self, residual: Floats) -> Floats:
-        """Return the displacement under a load, (neq,), that need not be balanced."""
-        return np.asarray(self._factors.solve(residual))
+        """Return the displacement under a load, (neq,) or (neq, loads), that need not be balanced.
+
+        Few loads are solved together: for more, BLAS wakes threads in each of the many small
+        products of the solution, which takes some twenty times as long.
+        """
+        if residual.ndim == 1:
+            return np.asarray(self._factors.solve(residual))
+        pieces = range(0, residual.shape[1], LOADS)
+        return np.hstack([self._factors.solve(residual[:, i : i + LOADS]) for i in pieces])
 
     def solve(self, residual: Floats, displacement: Floats | None = None) -> Floats:
         """Return the displacement under a load, (neq,).

@@ -49,6 +49,11 @@ class SymmetryReduction:
     weights: NDArray[np.int_]
 
     @property
+    def is_half(self) -> bool:
+        """Whether elements stand for their images."""
+        return bool((self.weights != 1).any())
+
+    @property
     def signed(self) -> bool:
         """Whether a dof has the opposite sign of the dof that it follows."""
         return bool((self.sign < 0.0).any())
