@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from fecm.sweeps.task import Task, tasks
 from tests.builders import table
 from tests.calls import call
 from tests.nonlinear_impacts import struck_rectangle
+from tests.test_kernels import compiled
 from tests.test_nonlinear_decks import forces, text
 from tests.test_nonlinear_sweeps import BLOW, LINEAR
 from tests.test_nonlinear_sweeps import PROGRAM as LONGER
@@ -215,6 +217,48 @@ def test_an_elastic_rod_hits_the_reduced_plate_as_the_full_one() -> None:
     assert model["rebound_velocity"] == pytest.approx(full["rebound_velocity"], rel=2e-3)
 
 
+@compiled
+@pytest.mark.parametrize("coupled", [False, True], ids=["flat-mass", "curved-damped-rod"])
+def test_kernels_give_what_numpy_gives_and_a_case_the_same_bytes_with_any_others(
+    coupled: bool,
+) -> None:
+    deck = text(PROGRAM, data=ROD + "CURV\n.02, .01, 0.\n\n" if coupled else BLOW)
+    (problem,) = load_deck(deck).problems
+    model = reduced(problem, ENOUGH)
+    if coupled:
+        model = replace(model, plate=replace(model.plate, damping=1000.0)).halved(3)
+    model = replace(model, steps=2000 if coupled else 500)
+    assert model.plate.flexibility > 0.0
+    assert model.plate.coupled == (0 if coupled else model.plate.bending)
+    rng = np.random.default_rng(3)
+    count = 11
+    scale, speed = rng.uniform(0.5, 2.0, count), rng.uniform(0.0, 900.0, count)
+    k, critical = rng.uniform(2e4, 8e4, count), rng.uniform(1e-3, 3e-3, count)
+    slope, q = rng.uniform(0.0, 0.2, count), rng.uniform(1.5, 2.5, count)
+
+    def hits(rows: list[int]) -> Hits:
+        law = HystereticLaw(LinearPermanent(k[rows], critical[rows], slope[rows], q[rows]))
+        kind = np.zeros(len(rows), np.intp)
+        return Hits([strike_of(problem.deck).projectile], kind, scale[rows], law, speed[rows])
+
+    whole = list(range(count))
+    actual, wanted = model.impacts(hits(whole)), model.by_numpy(hits(whole))
+    assert wanted.force.max() > 10.0
+    assert (np.abs(actual.force - wanted.force) <= 1e-10 * wanted.force.max()).all()
+    np.testing.assert_array_equal(actual.unconverged_steps, wanted.unconverged_steps)
+    np.testing.assert_allclose(actual.error, wanted.error, rtol=0.0, atol=1e-10)
+    for kind in ("indentation", "plate"):
+        for name, values in getattr(wanted, kind)._asdict().items():
+            atol = 1e-10 * np.abs(values).max()
+            computed = getattr(getattr(actual, kind), name)
+            np.testing.assert_allclose(computed, values, rtol=0.0, atol=atol, err_msg=name)
+    for some in ([3], [0, 10], [9, 8, 7, 6, 5, 4]):
+        part = model.impacts(hits(some))
+        np.testing.assert_array_equal(part.force, actual.force[:, some])
+        np.testing.assert_array_equal(part.error, actual.error[some])
+        np.testing.assert_array_equal(part.plate.largest, actual.plate.largest[some])
+
+
 def test_cases_of_many_velocities_are_few_tasks() -> None:
     (problem,) = load_deck(DECK).problems
     cases: list[Any] = [{"velocity": float(v)} for v in range(1, 301)]
@@ -235,7 +279,7 @@ def test_the_compliance_left_out_is_in_series_with_the_contact() -> None:
     # A plate that does not move but by the spring: the energy of the projectile is that of both.
     k, c, mass, speeds = 1e5, 2e-5, 1e-3, np.array([500.0, 2000.0])
     none = np.zeros((1, 1))
-    plate = ReducedPlate(1, np.array([1e16]), np.array([1e-3]), c, cubic=none, quartic=none)
+    plate = ReducedPlate(1, np.array([1e16]), np.array([1e-3]), c, cubic=none, factor=none)
     law = LinearPermanent(*(np.full(2, x) for x in (k, 1e9, 0.0, 1.5)))
     hits = Hits([RigidMass(mass)], np.zeros(2, np.intp), np.ones(2), HystereticLaw(law), speeds)
     actual = ReducedImpacts(plate, 5e-7, 2000).impacts(hits)

@@ -1,8 +1,8 @@
 """Many impacts on one plate by the compiled kernels.
 
-In: the plate's response to a unit force, a projectile in its modes, and the rows :class:`Given`
-with a value per case.  Out: the contact force at every step, and the rows :class:`ResultRow` with a
-value per case.
+In: the plate, by its response to a unit force or reduced to a few modes, a projectile in its modes,
+and the rows :class:`Given` with a value per case.  Out: the contact force at every step, and the
+rows :class:`ResultRow` with a value per case.
 """
 
 from __future__ import annotations
@@ -10,10 +10,13 @@ from __future__ import annotations
 import ctypes
 from ctypes import c_double, c_int64
 from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
 
 from fecm._typing import Floats
 from fecm.mechanics.impact_steps import LawKind
-from fecm.mechanics.kernels import LIBRARY, Doubles, Structure, floats
+from fecm.mechanics.kernels import LIBRARY, Doubles, Structure, filled, floats
 from fecm.mechanics.projectile import RodIntegrator
 from fecm.mechanics.rod_modes import ProjectileModes
 
@@ -87,26 +90,84 @@ class SweepStruct(Structure):
     )
 
 
-def sweep_impacts(
-    modes: ProjectileModes,
-    step: RodIntegrator,
-    law: LawKind,
-    response: Floats,
-    rigid: float,
-    given: Floats,
-    force: Floats,
-    found: Floats,
-) -> None:
-    """Compute the impacts of many cases by a projectile; write `force` and `found`.
+class ReducedStruct(Structure):
+    """A nonlinear plate in n coordinates, the first of which are modes of bending.
 
-    `response` is (steps,), `force` is (cases, steps).  `given` (given, cases) and `found`
-    (found, cases) may be columns of larger arrays.  A plate that is not held has a rigid motion:
-    `rigid` times the number of steps since a force of 1.  Raises MemoryError.
+    Matrices are cut by :func:`tiles`.  The arrays:
+
+    ============  =======================  =====================================================
+    `stiffness`   (n,)                     squares of the angular frequencies
+    `deflection`  (n,)                     displacement under the load
+    `keep`        (n,)                     increment of a coordinate per increment before
+    `share`       (n,)                     increment per force
+    `rate`        (n,)                     velocity per sum of the increments before and after
+    `factor`      (rank + n - coupled,     B over the rows of C from `coupled` on
+                  pairs)
+    `transposed`  (pairs,                  its transpose
+                  rank + n - coupled)
+    ============  =======================  =====================================================
     """
+
+    _fields_ = (
+        ("bending", c_int64),
+        ("coordinates", c_int64),
+        ("rank", c_int64),
+        ("coupled", c_int64),  # first coordinate with a row of C
+        ("flexibility", c_double),  # displacement of a spring at the contact per force
+        ("damping", c_double),  # a dt of the damping matrix a M
+        ("stiffness", Doubles),
+        ("deflection", Doubles),
+        ("keep", Doubles),
+        ("share", Doubles),
+        ("rate", Doubles),
+        ("factor", Doubles),
+        ("transposed", Doubles),
+    )
+
+
+def tiles(matrix: Floats) -> Floats:
+    """Cut a matrix into tiles of four rows, filled up with zeros: (rows / 4, columns, 4)."""
+    columns = filled(matrix.T)
+    return np.ascontiguousarray(columns.reshape(len(columns), -1, 4).swapaxes(0, 1))
+
+
+class Swept(NamedTuple):
+    """Impacts of many cases by a projectile; the kernels write `force` and `found`.
+
+    `given` (given, cases) and `found` (found, cases) may be columns of larger arrays.
+    """
+
+    modes: ProjectileModes
+    step: RodIntegrator
+    law: LawKind
+    given: Floats
+    force: Floats  # (cases, steps)
+    found: Floats
+
+
+def sweep_linear(response: Floats, rigid: float, swept: Swept) -> None:
+    """Compute impacts on a plate with a response to a unit force, (steps,).
+
+    A plate that is not held has a rigid motion: `rigid` times the number of steps since a force of
+    1.  Raises MemoryError.
+    """
+    if not LIBRARY.fecm_sweep(ctypes.byref(_structure(response, rigid, swept))):
+        raise MemoryError
+
+
+def sweep_reduced(plate: ReducedStruct, swept: Swept) -> None:
+    """Compute impacts on a nonlinear plate in a few modes.  Raises MemoryError."""
+    structure = _structure(np.empty(0), 0.0, swept)
+    if not LIBRARY.fecm_reduced(ctypes.byref(structure), ctypes.byref(plate)):
+        raise MemoryError
+
+
+def _structure(response: Floats, rigid: float, swept: Swept) -> SweepStruct:
+    modes, step, law, given, force, found = swept
     T, h = modes.step(step)
     before, after = step.weights
     cases, steps = force.shape
-    structure = SweepStruct(
+    return SweepStruct(
         cases=cases,
         stride=given.strides[0] // given.itemsize,
         steps=steps,
@@ -126,5 +187,3 @@ def sweep_impacts(
         force=force,
         found=floats(found),
     )
-    if not LIBRARY.fecm_sweep(ctypes.byref(structure)):
-        raise MemoryError

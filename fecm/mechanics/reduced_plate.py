@@ -31,6 +31,9 @@ the load:
 with the displacement g_i of a mode under the load and the static stiffness k_b of the linear plate
 there.  Each mode adds g_i^2/omega_i^2 to the static compliance.  The modes that add most are kept.
 
+Q is positive, and few of its eigenvectors matter for the stiffness of the plate under the load.
+With the rows of B, as few as keep this stiffness, Q = B' B and the last energy is 1/2 |B s|^2.
+
 The motion under the contact forces of many impacts is computed for all cases together.  Each
 coordinate q of frequency omega moves by
 
@@ -55,6 +58,7 @@ from fecm._machine import require_memory
 from fecm._typing import Floats, Indices
 from fecm.mechanics.contact_law import ContactPoint, Law
 from fecm.mechanics.element_matrices import membrane_and_bending
+from fecm.mechanics.impact_sweep import ReducedStruct, tiles
 from fecm.mechanics.interpolation import NDOF, interpolate
 from fecm.mechanics.membrane import BLOCK, TYING, QuadraticStrains
 from fecm.mechanics.mesh import ElementBlock
@@ -82,6 +86,11 @@ UNMOVED = 1e-10
 # Largest number of membrane modes, their least share in the static compliance, and their largest
 # frequency relative to the bending modes; a higher frequency would cost time steps.
 MEMBRANE_MODES, MEMBRANE_SHARE, MEMBRANE_FASTEST = 6, 0.01, 1.5
+# Error of B' B in the displacement that the stretching takes from a static one under the load,
+# relative to the largest.  It is the largest error of deflections whose modes scatter about the
+# static ones, by a share of each, and that reach from a part of the largest.
+STRETCHING = 1e-5
+SCATTER, SMALLEST, DEFLECTIONS = 0.5, 0.2, 200
 
 
 class ReductionError(FecmError, ArithmeticError):
@@ -114,7 +123,7 @@ class ReducedPlate:
     deflection: Floats  # (n,): displacement under the load; 0 for membrane modes
     flexibility: float  # 1/k_r: displacement of the modes left out per force
     cubic: Floats  # C, (n, pairs)
-    quartic: Floats  # Q, (pairs, pairs)
+    factor: Floats  # B, (rank, pairs): Q = B' B
     damping: float = 0.0  # a of the damping matrix a M
 
     @property
@@ -129,28 +138,41 @@ class ReducedPlate:
         return first, second
 
     @cached_property
+    def coupled(self) -> int:
+        """First coordinate with a row of C that is not 0, or the number of coordinates."""
+        rows = np.flatnonzero(self.cubic.any(axis=1))
+        return int(rows[0]) if len(rows) else len(self.cubic)
+
+    @cached_property
+    def stacked(self) -> Floats:
+        """B over the rows of C from :attr:`coupled` on."""
+        return np.vstack([self.factor, self.cubic[self.coupled :]])
+
+    @cached_property
     def _tables(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Q and C stacked, the transpose of C, and the sums over the pairs of each mode i and j."""
+        """B over C and its transpose, and the sums over the pairs of each mode i and j."""
         modes = np.arange(self.bending)[:, None]
         of_first, of_second = ((index == modes).astype(float) for index in self._pairs)
-        return np.vstack([self.quartic, self.cubic]), self.cubic.T.copy(), of_first, of_second
+        return self.stacked, self.stacked.T.copy(), of_first, of_second
 
     def strain_energy(self, q: Floats) -> Floats:
         """Return the strain energy, (cases,), of coordinates (n, cases)."""
         first, second = self._pairs
         s = q[first] * q[second]
         of_coordinates = q * (0.5 * self.stiffness[:, None] * q + self.cubic @ s)
-        of_pairs = 0.5 * s * (self.quartic @ s)
+        of_pairs = 0.5 * (self.factor @ s) ** 2
         return np.asarray(of_coordinates.sum(axis=0) + of_pairs.sum(axis=0))
 
     def internal_forces(self, q: Floats) -> Floats:
         """Return the derivatives of the strain energy with respect to coordinates (n, cases)."""
-        of_pairs, of_coordinates, of_first, of_second = self._tables
+        stacked, transposed, of_first, of_second = self._tables
+        rank, coupled = len(self.factor), self.coupled
         first, second = (q[index] for index in self._pairs)
-        stacked = of_pairs @ (first * second)
-        n, forces = stacked[: len(first)], stacked[len(first) :]
-        n += of_coordinates @ q
-        forces += self.stiffness[:, None] * q
+        of_rows = stacked @ (first * second)
+        forces = self.stiffness[:, None] * q
+        forces[coupled:] += of_rows[rank:]
+        of_rows[rank:] = q[coupled:]
+        n = transposed @ of_rows
         second *= n
         first *= n
         forces[: self.bending] += of_first @ second + of_second @ first
@@ -158,11 +180,16 @@ class ReducedPlate:
 
 
 def reduced_plate(
-    plate: PlateModel, contact: Floats, count: int, damping: float = 0.0
+    plate: PlateModel,
+    contact: Floats,
+    count: int,
+    damping: float = 0.0,
+    error: float = STRETCHING,
 ) -> ReducedPlate:
     """Reduce a plate to the `count` bending modes, at most, that a load (numnp, 5) moves most.
 
-    Raises ReductionError if the plate is not held, or if its modes do not converge.
+    `error` is the error of B, see :data:`STRETCHING`.  Raises ReductionError if the plate is not
+    held, or if its modes do not converge.
     """
     turn = _at_rest(plate, contact)
     bending = _bending_modes(plate, turn, contact, count)
@@ -191,15 +218,40 @@ def reduced_plate(
         cubic = np.concatenate([cubic, rows])
         stiffness.append(membrane.stiffness)
         deflection.append(np.zeros(len(rows)))
+    static = bending.deflection / bending.stiffness
     return ReducedPlate(
         bending=len(bending.stiffness),
         stiffness=np.concatenate(stiffness),
         deflection=np.concatenate(deflection),
         flexibility=max(bending.compliance - float(bending.shares.sum()), 0.0),
         cubic=cubic,
-        quartic=(quartic + quartic.T) / 2.0,
+        factor=factor_of((quartic + quartic.T) / 2.0, static, error),
         damping=damping,
     )
+
+
+def factor_of(quartic: Floats, static: Floats, error: float) -> Floats:
+    """Return B, (rank, pairs), with Q = B' B up to an error; see :data:`STRETCHING`.
+
+    `static` (m,) are the bending modes in the static deflection.  The rank is the least one.
+    """
+    first, second = np.triu_indices(len(static))
+    # Eigenvectors of Q for pairs of the size that they have in the static deflection.
+    size = np.abs(static[first] * static[second])
+    values, vectors = np.linalg.eigh(quartic * np.outer(size, size))
+    rows = (np.sqrt(np.maximum(values, 0.0)) * vectors).T[::-1] / size
+    random = np.random.default_rng(0)
+    shape = len(static), DEFLECTIONS
+    scattered = static[:, None] * (1.0 + SCATTER * random.standard_normal(shape))
+    q = scattered * random.uniform(SMALLEST, 1.0, DEFLECTIONS)
+    # What the forces of each row on the modes, N_ij q_j + N_ji q_j, do statically.
+    static = static[:, None]
+    parts = (rows @ (q[first] * q[second])) * (
+        rows @ (static[first] * q[second] + static[second] * q[first])
+    )
+    left_out = np.abs(np.cumsum(parts[::-1], axis=0)[::-1]).max(axis=1)
+    matter = np.flatnonzero(left_out > error * np.abs(parts.sum(axis=0)).max())
+    return np.ascontiguousarray(rows[: matter[-1] + 1 if len(matter) else 0])
 
 
 # Modes --------------------------------------------------------------------------------------------
@@ -462,6 +514,38 @@ EVALUATIONS = 40
 TOLERANCE = 1e-9
 
 
+class _Step(NamedTuple):
+    """Numbers of a time step, (n,) each."""
+
+    keep: Floats  # increment of a coordinate per increment before
+    share: Floats  # increment per force
+    rate: Floats  # velocity per sum of the increments before and after
+
+
+def _step(plate: ReducedPlate, dt: float) -> _Step:
+    phase = np.sqrt(plate.stiffness) * dt
+    inertia = dt * dt * np.sinc(phase / (2.0 * np.pi)) ** 2  # dt^2 psi
+    b = 0.5 * plate.damping * inertia / dt
+    return _Step((1.0 - b) / (1.0 + b), inertia / (1.0 + b), 0.5 / (dt * np.sinc(phase / np.pi)))
+
+
+def motion_struct(plate: ReducedPlate, dt: float) -> ReducedStruct:
+    """Return what the compiled kernels need to move a plate by steps of one size."""
+    return ReducedStruct(
+        bending=plate.bending,
+        coordinates=len(plate.stiffness),
+        rank=len(plate.factor),
+        coupled=plate.coupled,
+        flexibility=plate.flexibility,
+        damping=plate.damping * dt,
+        stiffness=plate.stiffness,
+        deflection=plate.deflection,
+        factor=tiles(plate.stacked),
+        transposed=tiles(plate.stacked.T),
+        **_step(plate, dt)._asdict(),
+    )
+
+
 class ReducedMotion:
     """Motion of a reduced plate from rest, in many cases with one time step."""
 
@@ -470,10 +554,7 @@ class ReducedMotion:
         shape = (-(-cases // TILE), len(plate.stiffness), TILE)
         self._q, self._increment, self._internal = np.zeros((3, *shape))
         self._force = np.zeros((shape[0], 1, TILE))
-        phase = np.sqrt(plate.stiffness)[:, None] * dt
-        self._inertia = dt * dt * np.sinc(phase / (2.0 * np.pi)) ** 2  # dt^2 psi
-        self._of_velocity = 1.0 / np.sinc(phase / np.pi)
-        self._damping = 0.5 * plate.damping * self._inertia / dt
+        self._step = _Step(*(numbers[:, None] for numbers in _step(plate, dt)))
         self._damped = np.zeros((shape[0], TILE))  # energy lost by damping up to half a step ago
 
     def advance(self, force: Floats) -> Floats:
@@ -502,15 +583,14 @@ class ReducedMotion:
 
     def _square_of_velocity(self, increment: Floats) -> Floats:
         """Return the sum of squared velocities between the last increments and other increments."""
-        velocity = self._of_velocity * (self._increment + increment) / (2.0 * self.dt)
+        velocity = self._step.rate * (self._increment + increment)
         return np.asarray((velocity * velocity).sum(axis=1))
 
     def _next_increment(self, force: Floats) -> Floats:
         """Return the increments of the coordinates in the next step."""
         self._force.reshape(-1)[: self._cases] = force
         pull = self.plate.deflection[:, None] * self._force - self._internal
-        b = self._damping
-        return ((1.0 - b) * self._increment + self._inertia * pull) / (1.0 + b)
+        return np.asarray(self._step.keep * self._increment + self._step.share * pull)
 
 
 class SeriesLaw(NamedTuple):

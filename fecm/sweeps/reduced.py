@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ from fecm.authoring.time_values import duration_of
 from fecm.authoring.values import strike_of_case
 from fecm.mechanics.contact_law import ContactPoint
 from fecm.mechanics.impact import ContactState, couple_step
+from fecm.mechanics.impact_sweep import sweep_reduced
 from fecm.mechanics.plate import ASSEMBLED, PlateModel
 from fecm.mechanics.reduced_plate import (
     MORE_VECTORS,
@@ -33,6 +35,7 @@ from fecm.mechanics.reduced_plate import (
     ReductionError,
     SeriesLaw,
     bytes_of_pairs,
+    motion_struct,
     reduced_plate,
 )
 from fecm.problem.memory import factor_bytes
@@ -51,6 +54,8 @@ from fecm.sweeps.responses import (
     TipSteps,
     Work,
     balance_errors,
+    by_kernel,
+    known_constants,
 )
 from fecm.sweeps.task import Method, Plan, Prepared, RunTasks, Task, tasks
 
@@ -87,6 +92,13 @@ class ReducedImpacts:
         return replace(self, dt=self.dt / 2**times, steps=self.steps * 2**times)
 
     def impacts(self, hits: Hits) -> ComputedImpacts:
+        """Compute impacts."""
+        if (constants := known_constants(hits.law)) is not None:
+            kernel = partial(sweep_reduced, motion_struct(self.plate, self.dt))
+            return by_kernel(kernel, self.steps, self.dt, hits, constants)
+        return self.by_numpy(hits)
+
+    def by_numpy(self, hits: Hits) -> ComputedImpacts:
         """Compute impacts step by step, all cases together."""
         cases = len(hits.speed)
         flexibility, none = self.plate.flexibility, np.zeros(cases)

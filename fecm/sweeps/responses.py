@@ -11,8 +11,8 @@ contributions of steps within the block are added one by one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +31,7 @@ from fecm.mechanics.contact_law import (
 )
 from fecm.mechanics.impact import ContactState, ImpactConditions, ImpactSystem, couple_step
 from fecm.mechanics.impact_steps import ImpactSteps, can_step, kernel_law, knows
-from fecm.mechanics.impact_sweep import Given, ResultRow, sweep_impacts
+from fecm.mechanics.impact_sweep import Given, ResultRow, Swept, sweep_linear
 from fecm.mechanics.plate_motion import AppliedForce, DofSums, Load, PlateMotion
 from fecm.mechanics.projectile import Projectile, RigidMass, RodIntegrator, RodState, WilsonStep
 from fecm.mechanics.rod_modes import ProjectileModes
@@ -284,9 +284,10 @@ def impacts(
     or 1/(g M^-1 g) of a patch with the weights g. `mobility` (1/mass) is the mobility of the rigid
     motion of a plate that is not held.
     """
-    law, rigid = hits.law, mobility * dt**2
-    if kernels.LIBRARY is not None and isinstance(law, HystereticLaw) and knows(law.constants):
-        return _by_kernels(response, dt, node_mass, hits, law.constants, rigid)
+    rigid = mobility * dt**2
+    if (constants := known_constants(hits.law)) is not None:
+        kernel = partial(sweep_linear, response, rigid)
+        return by_kernel(kernel, len(response), dt, hits, constants, node_mass)
     return by_numpy(response, node_mass, TipSteps(hits, dt, len(response)), rigid)[0]
 
 
@@ -410,15 +411,25 @@ def _modes(rod: Projectile) -> ProjectileModes:
     return ProjectileModes.of(rod.stiffness(), rod.mass(), rod.rigid)
 
 
-def _by_kernels(
-    response: Floats,
+def known_constants(law: Law[Floats]) -> ContactParameters[Floats] | None:
+    """Return the constants of a law that the compiled kernels have; None without kernels."""
+    if kernels.LIBRARY is None or not isinstance(law, HystereticLaw) or not knows(law.constants):
+        return None
+    return law.constants
+
+
+def by_kernel(
+    kernel: Callable[[Swept], None],
+    steps: int,
     dt: float,
-    node_mass: float,
     hits: Hits,
     constants: ContactParameters[Floats],
-    rigid: float,
+    node_mass: float = 0.0,
 ) -> ComputedImpacts:
-    """Compute impacts by the compiled kernels, and projectiles by their modes."""
+    """Compute impacts by a compiled kernel, and projectiles by their modes.
+
+    `node_mass` is that of :func:`impacts`; it is 0 where the kernel knows the energy of the plate.
+    """
     law = kernel_law(constants)
     rows: dict[Given, float | Floats] = {
         Given.K: constants.k,
@@ -430,20 +441,20 @@ def _by_kernels(
     }
     inputs = np.stack(np.broadcast_arrays(*(rows[row] for row in Given)))
     cases = len(hits.speed)
-    force, results = np.empty((cases, len(response))), np.empty((len(ResultRow), cases))
+    force, results = np.empty((cases, steps)), np.empty((len(ResultRow), cases))
     starts = np.searchsorted(hits.kind, np.arange(len(hits.rods) + 1)).tolist()
     for rod, first, last in zip(hits.rods, starts[:-1], starts[1:], strict=True):
         step = WilsonStep(rod.stiffness(), rod.mass(), dt, rigid=rod.rigid)
         chosen = slice(first, last)
-        sweep_impacts(
-            _modes(rod),
-            step,
-            law.kind,
-            response,
-            rigid,
-            inputs[:, chosen],
-            force[chosen],
-            results[:, chosen],
+        kernel(
+            Swept(
+                _modes(rod),
+                step,
+                law.kind,
+                inputs[:, chosen],
+                force[chosen],
+                results[:, chosen],
+            )
         )
     lost = results[ResultRow.LOST] + node_mass * results[ResultRow.LARGEST_DDW] ** 2 / (8.0 * dt**2)
     initial = results[ResultRow.INITIAL]

@@ -52,6 +52,7 @@ FUNCTIONS = {
     "fecm_internal_force": (c_int, [c_void_p, c_int64, Doubles]),
     "fecm_impact_steps": (c_int64, [c_void_p, c_void_p, c_int64, c_int64]),
     "fecm_sweep": (c_int, [c_void_p]),
+    "fecm_reduced": (c_int, [c_void_p, c_void_p]),
     "fecm_strains": (None, [c_void_p, c_int64, c_int64, c_int64, Doubles, Doubles]),
     "fecm_failure": (None, [c_void_p, c_int64, c_int64, Doubles, Doubles, Doubles, Longs, Codes]),
 }

@@ -8,6 +8,7 @@
  *   assumed_shear.h  assumed shear strains of factorized elements; twice
  *   membrane.h    forces of the membrane of a nonlinear plate; twice
  *   sweep.h       many impacts on one plate, eight at a time; twice
+ *   reduced.h     the same on a nonlinear plate in a few modes; twice
  *   midplane.h    strains of the midplane and curvatures for the exposures; twice
  *   failure.h     exposures of plies, four states of stress at a time; twice
  *
@@ -58,6 +59,8 @@
 #define TIE 1.0e-9 /* see fecm/mechanics/exposures.py */
 #define LEAST_WORK 1.0e-3 /* see fecm/judge/end.py */
 #define TOLERANCE 1.0e-6
+#define SOLVED 1.0e-9 /* see TOLERANCE and EVALUATIONS of fecm/mechanics/reduced_plate.py */
+#define EVALUATIONS 40
 #define MOST_THREADS 64
 #define MOST_SPINS 2000 /* spins of a waiting thread before it sleeps: some ten microseconds, the time of waking */
 #if defined __x86_64__ || defined __i386__
@@ -83,6 +86,7 @@ enum {
     GROUPS = 2, /* groups of WIDTH cases that are computed together */
     CASES = WIDTH * GROUPS,
     CHECKED = 64, /* steps from one check of the energies to the next */
+    TILE = 4,     /* rows of a matrix that are multiplied together */
     FAR = 128     /* steps whose forces act on later blocks of steps by Fourier transforms */
 };
 
@@ -97,6 +101,13 @@ typedef struct {
     int64_t spaced;        /* blocks, or one more: an odd stride uses all sets of the cache */
 } Response;
 
+/* Motion of a nonlinear plate in a few modes, and work arrays for its membrane forces; GROUPS numbers each. */
+typedef struct {
+    half *q, *d, *f;    /* (coordinates,): displacements, their last increments, internal forces */
+    half *s, *n, *sums; /* (pairs,): products of coordinates, and forces on them; (rows,): products with `factor` */
+    half *projectile;   /* (modes, GROUPS, 3): see Response */
+} Reduction;
+
 /* Loading histories of four cases; see History. */
 typedef struct {
     half branch, f, b, w, p, peak, peak_force, permanent;
@@ -109,6 +120,7 @@ typedef struct {
     Histories history;
     half scale, gain; /* factor of mass and stiffness; acceleration of the tip per force */
     half tip, velocity, acceleration, indentation, force, push, w, dw;
+    half approach; /* indentation, and the displacement of a spring in series with the contact */
     half initial, contact_work, plate_work; /* energies */
     half bent, bent_work; /* displacement without the rigid motion of the plate, and the work of the force on it */
     half pushes, rigid;   /* sum of the forces, and the displacement of the rigid motion */
@@ -200,6 +212,7 @@ __attribute__((constructor)) static void ask_processor(void) {
 #define SIGNS(where) _mm256_movemask_pd((__m256d)(where))
 #include "plate.h"
 #include "sweep.h"
+#include "reduced.h"
 #include "midplane.h"
 #include "failure.h"
 #undef ROOT
@@ -226,6 +239,7 @@ __attribute__((constructor)) static void ask_processor(void) {
 #endif
 #include "plate.h"
 #include "sweep.h"
+#include "reduced.h"
 #include "midplane.h"
 #include "failure.h"
 #ifdef HAS_AVX2_CODE
@@ -520,6 +534,23 @@ EXPORT int fecm_sweep(const Sweep *x) {
     respond(x, &r);
     CHOSEN(filters)(x, &r);
     for (int64_t first = 0; first < x->cases; first += CASES) CHOSEN(run_cases)(x, &r, first);
+    free(memory);
+    return 1;
+}
+
+/* Compute impacts on a nonlinear plate in a few modes; returns 0 if there is not enough memory. */
+EXPORT int fecm_reduced(const Sweep *x, const Reduced *plate) {
+    const int64_t n = plate->coordinates, m = plate->bending, pairs = m * (m + 1) / 2;
+    const int64_t rows = plate->rank + n - plate->coupled;
+    const int64_t sizes[] = {n, n, n, pairs, pairs + TILE, rows + TILE, 3 * x->modes};
+    int64_t size = 0;
+    for (int i = 0; i < 7; i++) size += GROUPS * sizes[i];
+    half *memory = malloc(sizeof(half) * size), *at = memory;
+    if (!memory) return 0;
+    Reduction r;
+    half **arrays[] = {&r.q, &r.d, &r.f, &r.s, &r.n, &r.sums, &r.projectile};
+    for (int i = 0; i < 7; at += GROUPS * sizes[i++]) *arrays[i] = at;
+    for (int64_t first = 0; first < x->cases; first += CASES) CHOSEN(run_reduced)(x, plate, &r, first);
     free(memory);
     return 1;
 }

@@ -154,6 +154,18 @@ typedef struct {
     double *force, *found; /* (cases, steps), (FOUND, cases) */
 } Sweep;
 
+/* Nonlinear plate in n coordinates, `bending` modes followed by modes of the membrane; see reduced_plate.py.
+ * Matrices are cut into tiles of four rows, filled up with zeros: (rows / 4, columns, 4). */
+typedef struct {
+    int64_t bending, coordinates;
+    int64_t rank, coupled; /* rows of B; first coordinate with a row of C, `coordinates` without one */
+    double flexibility, damping; /* displacement of a spring at the contact per force; a dt of the damping matrix a M */
+    const double *stiffness, *deflection; /* (n,): squared angular frequency, displacement under the load */
+    const double *keep, *share;           /* (n,): next increment per last one and per force */
+    const double *rate;                   /* (n,): velocity per sum of the increments before and after */
+    const double *factor, *transposed;    /* B over C, (rank + n - coupled, pairs), and its transpose */
+} Reduced;
+
 /* Rows of `given`. */
 enum { GIVEN_K, GIVEN_Q, GIVEN_CRITICAL, GIVEN_SLOPE, GIVEN_VELOCITY, GIVEN_FACTOR, GIVEN };
 

@@ -275,8 +275,9 @@ APART TARGET void NAME(move_modes)(const Sweep *x, const Response *r, const half
     }
 }
 
-/* Initialise cases before their impacts; cases beyond the last repeat it. */
-INLINE void NAME(begin)(const Sweep *x, const Response *r, int64_t first, Cases *c) {
+/* Initialise cases before their impacts; cases beyond the last repeat it.  `gain` is the acceleration of the tip per
+ * force. */
+INLINE void NAME(begin)(const Sweep *x, double gain, int64_t first, Cases *c) {
     const half none = {0};
     half given[GIVEN];
     for (int lane = 0; lane < WIDTH; lane++) {
@@ -286,19 +287,19 @@ INLINE void NAME(begin)(const Sweep *x, const Response *r, int64_t first, Cases 
                              given[GIVEN_SLOPE][lane], x->law};
     }
     c->history = (Histories){none, given[GIVEN_K], none, none + 1.0, none + 1.5, none, none, none};
-    c->scale = given[GIVEN_FACTOR], c->gain = r->gain / c->scale;
+    c->scale = given[GIVEN_FACTOR], c->gain = gain / c->scale;
     c->tip = none, c->velocity = -given[GIVEN_VELOCITY], c->acceleration = none;
-    c->indentation = c->force = c->push = c->w = c->dw = none;
+    c->approach = c->indentation = c->force = c->push = c->w = c->dw = none;
     c->deepest = c->highest = c->sharpest = c->lost = c->unconverged = none;
     c->fastest = c->compliance = none;
     c->bent = c->bent_work = c->pushes = c->rigid = none;
     c->plate_work = c->contact_work = none;
 }
 
-/* Record a step that ends at a displacement of the plate, a force and an indentation. */
-INLINE void NAME(record)(const Sweep *x, Cases *c, half w, half force, half indentation) {
+/* Record a step that ends at a displacement of the plate, a force, an approach and an indentation. */
+INLINE void NAME(record)(const Sweep *x, Cases *c, half w, half force, half approach, half indentation) {
     const half mean = 0.5 * (c->force + force), before = c->dw;
-    c->contact_work += mean * (indentation - c->indentation);
+    c->contact_work += mean * (approach - c->approach);
     c->dw = w - c->w;
     c->plate_work += mean * c->dw;
     const half bend = NAME(size)(c->dw - before);
@@ -306,7 +307,7 @@ INLINE void NAME(record)(const Sweep *x, Cases *c, half w, half force, half inde
     c->rigid += x->rigid * c->pushes;
     const half bent = w - c->rigid, change = bent - c->bent;
     c->bent_work += mean * change;
-    c->w = w, c->bent = bent, c->force = force, c->indentation = indentation;
+    c->w = w, c->bent = bent, c->force = force, c->approach = approach, c->indentation = indentation;
     const half fast = NAME(size)(change), least = LEAST_WORK * c->initial;
     c->fastest = NAME(choose)(fast > c->fastest, fast, c->fastest);
     const half energy = NAME(choose)(c->bent_work > least, c->bent_work, least);
@@ -317,10 +318,64 @@ INLINE void NAME(record)(const Sweep *x, Cases *c, half w, half force, half inde
     c->highest = NAME(choose)(w > c->highest, w, c->highest);
 }
 
-/* The contact iteration and the step of the tip; see couple_step. */
-INLINE void NAME(couple)(const Sweep *x, Cases *cases, const half *w, const half *base) {
+/* Forces of the contact law at trial indentations, in the cases `where`. */
+INLINE void NAME(trial)(const Cases *cases, const mask *where, const half *a, half *force) {
+    mask turning[GROUPS];
+    for (int g = 0; g < GROUPS; g++) turning[g] = where[g] & NAME(turns)(cases + g, a[g]);
+    NAME(curves)(cases, a, force);
+    if (!NAME(any)(turning)) return;
+    for (int g = 0; g < GROUPS; g++)
+        for (int lane = 0; lane < WIDTH; lane++) {
+            if (!turning[g][lane]) continue;
+            const History new = NAME(turned)(cases + g, lane, a[g][lane]);
+            force[g][lane] = force_of(&new, a[g][lane]);
+        }
+}
+
+/* Indentations and forces of the law in series with a spring, at approaches; see SeriesLaw in reduced_plate.py. */
+APART TARGET void NAME(in_series)(double flexibility, const Cases *cases, const half *approach, half *a, half *force) {
     const half none = {0};
-    half drift[GROUPS], carried[GROUPS], trial[GROUPS], force[GROUPS], a[GROUPS];
+    half excess[GROUPS] = {{0}}, last[GROUPS], far[GROUPS], far_excess[GROUPS];
+    mask all[GROUPS], open[GROUPS];
+    for (int g = 0; g < GROUPS; g++) {
+        all[g] = none == none;
+        far[g] = approach[g] - flexibility * cases[g].force;
+    }
+    NAME(trial)(cases, all, far, force);
+    for (int g = 0; g < GROUPS; g++) {
+        far_excess[g] = far[g] + flexibility * force[g] - approach[g];
+        const half end = cases[g].indentation, next = far[g] - far_excess[g];
+        const half low = NAME(choose)(end < far[g], end, far[g]), high = NAME(choose)(end < far[g], far[g], end);
+        a[g] = NAME(choose)(next < low, low, NAME(choose)(next > high, high, next));
+    }
+    for (int count = 0; count <= EVALUATIONS; count++) {
+        NAME(trial)(cases, all, a, force);
+        for (int g = 0; g < GROUPS; g++) {
+            const half before = excess[g];
+            excess[g] = a[g] + flexibility * force[g] - approach[g];
+            if (count) {
+                const mask crosses = excess[g] * before <= 0.0;
+                const half weight = 1.0 - excess[g] / before;
+                const half kept = far_excess[g] * NAME(choose)(weight > 0.0, weight, none + 0.5);
+                far_excess[g] = NAME(choose)(open[g], NAME(choose)(crosses, before, kept), far_excess[g]);
+                far[g] = NAME(choose)(open[g] & crosses, last[g], far[g]);
+            }
+            open[g] = ~(NAME(size)(excess[g]) <= SOLVED * NAME(size)(approach[g]));
+        }
+        if (count == EVALUATIONS || !NAME(any)(open)) return;
+        for (int g = 0; g < GROUPS; g++) {
+            last[g] = a[g];
+            const half secant = a[g] - excess[g] * (a[g] - far[g]) / (excess[g] - far_excess[g]);
+            a[g] = NAME(choose)(open[g], secant, a[g]);
+        }
+    }
+}
+
+/* The contact iteration and the step of the tip; see couple_step.  The contact is in series with a spring of a
+ * flexibility, which is a part of the approach and of the plate's displacement. */
+INLINE void NAME(couple)(const Sweep *x, double flexibility, Cases *cases, const half *w, const half *base) {
+    const half none = {0};
+    half drift[GROUPS], carried[GROUPS], trial[GROUPS], force[GROUPS], approach[GROUPS], a[GROUPS];
     mask iterating[GROUPS], turning[GROUPS];
     for (int g = 0; g < GROUPS; g++) {
         const Cases *c = cases + g;
@@ -332,18 +387,11 @@ INLINE void NAME(couple)(const Sweep *x, Cases *cases, const half *w, const half
     }
     for (int pass = 0; pass < PASSES && NAME(any)(iterating); pass++) {
         half tried[GROUPS];
-        for (int g = 0; g < GROUPS; g++) {
-            a[g] = -trial[g] - w[g];
-            turning[g] = iterating[g] & NAME(turns)(cases + g, a[g]);
-        }
-        NAME(curves)(cases, a, tried);
-        if (NAME(any)(turning))
-            for (int g = 0; g < GROUPS; g++)
-                for (int lane = 0; lane < WIDTH; lane++) {
-                    if (!turning[g][lane]) continue;
-                    const History new = NAME(turned)(cases + g, lane, a[g][lane]);
-                    tried[g][lane] = force_of(&new, a[g][lane]);
-                }
+        for (int g = 0; g < GROUPS; g++) approach[g] = -trial[g] - w[g];
+        if (flexibility > 0.0)
+            NAME(in_series)(flexibility, cases, approach, a, tried);
+        else
+            NAME(trial)(cases, iterating, approach, tried);
         for (int g = 0; g < GROUPS; g++) {
             force[g] = NAME(choose)(iterating[g], tried[g], force[g]);
             const half before = trial[g];
@@ -359,9 +407,13 @@ INLINE void NAME(couple)(const Sweep *x, Cases *cases, const half *w, const half
         c->tip = drift[g] + x->weight * now;
         c->velocity += x->dt / 2.0 * (c->acceleration + now);
         c->acceleration = now;
-        a[g] = -c->tip - w[g];
-        turning[g] = NAME(turns)(c, a[g]);
+        a[g] = approach[g] = -c->tip - w[g];
     }
+    if (flexibility > 0.0) {
+        half unused[GROUPS];
+        NAME(in_series)(flexibility, cases, approach, a, unused);
+    }
+    for (int g = 0; g < GROUPS; g++) turning[g] = NAME(turns)(cases + g, a[g]);
     if (NAME(any)(turning))
         for (int g = 0; g < GROUPS; g++)
             for (int lane = 0; lane < WIDTH; lane++) {
@@ -372,15 +424,21 @@ INLINE void NAME(couple)(const Sweep *x, Cases *cases, const half *w, const half
                 m->p[lane] = new.p, m->peak[lane] = new.peak, m->peak_force[lane] = new.peak_force;
                 m->permanent[lane] = new.permanent;
             }
-    for (int g = 0; g < GROUPS; g++) NAME(record)(x, cases + g, w[g], force[g], a[g]);
+    for (int g = 0; g < GROUPS; g++) {
+        Cases *c = cases + g;
+        if (flexibility > 0.0)
+            NAME(record)(x, c, w[g] + flexibility * force[g], force[g], approach[g], approach[g] - flexibility * force[g]);
+        else
+            NAME(record)(x, c, w[g], force[g], approach[g], approach[g]);
+    }
 }
 
-/* Compare the energies of the cases with the initial energies. */
-INLINE void NAME(balance)(const Sweep *x, const half *motion, Cases *c) {
+/* Compare the energies of the cases with the initial energies; `plate` is the energy of the plate. */
+INLINE void NAME(balance)(const Sweep *x, const half *motion, half plate, Cases *c) {
     half energy = {0};
     for (int64_t i = 0; i < x->modes; i++, motion += 3 * GROUPS)
         energy += motion[1] * motion[1] + x->stiffness[i] * motion[0] * motion[0];
-    const half error = NAME(size)(0.5 * c->scale * energy + c->contact_work + c->plate_work - c->initial);
+    const half error = NAME(size)(0.5 * c->scale * energy + c->contact_work + plate - c->initial);
     c->lost = NAME(choose)(~(error <= c->lost), error, c->lost);
 }
 
@@ -416,7 +474,7 @@ TARGET void NAME(run_cases)(const Sweep *x, const Response *r, int64_t first) {
     memset(r->motion, 0, sizeof(half) * 3 * GROUPS * x->modes);
     for (int g = 0; g < GROUPS; g++) {
         Cases *c = cases + g;
-        NAME(begin)(x, r, first + WIDTH * g, c);
+        NAME(begin)(x, r->gain, first + WIDTH * g, c);
         half *rigid = r->motion + 3 * g + 1;
         *rigid = c->velocity / x->tip_shape[0];
         c->initial = 0.5 * c->scale * *rigid * *rigid;
@@ -443,7 +501,7 @@ TARGET void NAME(run_cases)(const Sweep *x, const Response *r, int64_t first) {
             const half pushed = far[1] + near[g][0][1];
             base[g] = pushed * r->unit / cases[g].scale;
         }
-        NAME(couple)(x, cases, w, base);
+        NAME(couple)(x, 0.0, cases, w, base);
         for (int g = 0; g < GROUPS; g++) {
             const Cases *c = cases + g;
             r->force[GROUPS * row + g] = c->force;
@@ -453,7 +511,7 @@ TARGET void NAME(run_cases)(const Sweep *x, const Response *r, int64_t first) {
         }
         if ((step + 1) % CHECKED && step + 1 < x->steps) continue;
         NAME(move_modes)(x, r, applied, step % CHECKED + 1);
-        for (int g = 0; g < GROUPS; g++) NAME(balance)(x, r->motion + 3 * g, cases + g);
+        for (int g = 0; g < GROUPS; g++) NAME(balance)(x, r->motion + 3 * g, cases[g].plate_work, cases + g);
     }
     for (int g = 0; g < GROUPS; g++) NAME(store_found)(x, cases + g);
 }
