@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -29,8 +30,14 @@ def until_over(every: int = 20, passes: int = 16000) -> str:
     )
 
 
+@cache
+def run_until_over() -> fecm.Result:
+    """Result of the report's plate and rod, until the impact is over."""
+    return fecm.run_one(until_over())
+
+
 def test_a_loop_ends_at_the_first_tested_pass_at_which_the_impact_is_over() -> None:
-    run = fecm.run_one(until_over())
+    run = run_until_over()
     whole = fecm.run_one(REPORT.replace("LOOP       4000", "LOOP      12000"))
     steps = len(run.force)
     assert run.end is End.OVER
@@ -50,7 +57,7 @@ def steps_of(path: Path) -> int:
 
 
 def test_no_solver_and_no_size_of_blocks_changes_the_last_pass(tmp_path: Path) -> None:
-    steps = {len(fecm.run_one(until_over(), solver=s).force) for s in ("kernels", "numpy")}
+    steps = {len(run_until_over().force), len(fecm.run_one(until_over(), solver="numpy").force)}
     for interval in (7, 64, 1000):  # steps of a call of the kernels at most
         run_stopping(until_over(), tmp_path / "run.h5", interval=interval)
         steps.add(steps_of(tmp_path / "run.h5"))
@@ -78,8 +85,9 @@ def with_rows(words: str, passes: int) -> Deck:
 ORDERS = ("DISP FAIL PLYS OVER", "OVER DISP FAIL PLYS", "FAIL OVER PLYS DISP", "DISP STRE OVER")
 
 
-@pytest.mark.parametrize("solver", ["kernels", "numpy"])
+@pytest.mark.few(5)
 @pytest.mark.parametrize("words", ORDERS)
+@pytest.mark.parametrize("solver", ["kernels", "numpy"])
 def test_a_loop_that_ends_early_stores_what_a_loop_of_its_passes_stores(
     words: str, solver: Literal["kernels", "numpy"], tmp_path: Path
 ) -> None:
@@ -135,7 +143,7 @@ def test_a_loop_without_an_end_makes_all_its_passes() -> None:
 
 
 def test_over_waits_for_its_first_pass() -> None:
-    (early,) = {len(fecm.run_one(until_over()).force)}
+    early = len(run_until_over().force)
     late = fecm.run_one(until_over().replace("OVER,,20", f"OVER,,20,{early + 7}"))
     assert len(late.force) == early + 7
 

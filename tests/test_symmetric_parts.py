@@ -67,7 +67,7 @@ def assert_same_columns(sweep: fecm.SweepResult, whole: fecm.SweepResult) -> Non
 # Runs --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(8)
+@pytest.mark.few(5)
 @pytest.mark.parametrize("part", PARTS)
 @pytest.mark.parametrize("plate", PLATES)
 def test_the_metrics_of_a_part_are_those_of_the_whole_plate(plate: str, part: str) -> None:
@@ -121,6 +121,7 @@ OTHER_PLATES: dict[str, tuple[Callable[[], fecm.Deck], Literal["report", "listin
 }
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize("plate", OTHER_PLATES)
 def test_every_kind_of_plate_has_parts_with_the_numbers_of_the_whole(plate: str) -> None:
     build, mode = OTHER_PLATES[plate]
