@@ -32,6 +32,7 @@ from fecm._typing import FiniteFloat
 from fecm.cli.info import LocationFileJson, RunFileJson, SweepFileJson
 from fecm.cli.run import ProblemRunJson
 from fecm.deck.findings import FindingJson
+from fecm.identification.edges import EdgeFitJson
 from fecm.problem.summary import ProblemSummary
 from fecm.results.difference import DifferenceJson, PositionJson
 from fecm.results.summary import MetricsJson
@@ -75,7 +76,7 @@ OUTPUTS: dict[str, tuple[str, list[type]]] = {
     "sweep": ("Output of `fecm sweep --format json`", [SweepJson]),
     "info": ("Output of `fecm info --format json`", [RunFileJson, SweepFileJson, LocationFileJson]),
     "diff": ("Output of `fecm diff --format json`", [DifferenceJson]),
-    "modes": ("Output of `fecm modes --format json`", [ModesJson]),
+    "modes": ("Output of `fecm modes --format json`", [ModesJson, EdgeFitJson]),
 }
 
 

@@ -14,8 +14,19 @@ from fecm._files import check_outputs
 from fecm._text import csv_lines
 from fecm.cli.common import echo, echo_json, note
 from fecm.cli.decks import refusing_errors
-from fecm.cli.options import DECK_PATH, NAMED_PATH, Format, OneOf, format_option, typical
+from fecm.cli.options import (
+    DECK_PATH,
+    NAMED_PATH,
+    Finite,
+    Format,
+    OneOf,
+    format_option,
+    list_of,
+    typical,
+)
+from fecm.deck.grid import EDGES
 from fecm.deck.units import column_name
+from fecm.identification.edges import KR, fit_edges
 from fecm.mechanics.projectile import LUMPED, MASSES, MassMatrix
 from fecm.plot.kinds import PictureKind
 from fecm.plot.pictures import check_suffix, draw, require_matplotlib, save_picture
@@ -63,6 +74,32 @@ from fecm.studies.modes import MOST_MODES, ModeJson, PlateModes, modes
 @format_option(
     Format.TEXT, Format.JSON, Format.CSV, about="Text for people, JSON or CSV for programs."
 )
+@option(
+    "--measured",
+    type=list_of("F1,F2,...", Finite()),
+    help="Measured frequencies, ascending: fit the stiffness of the edges of a rectangle to them.",
+)
+@option(
+    "--of",
+    "numbers",
+    type=list_of("N1,N2,...", click.INT),
+    help="Numbers of the measured modes.  [default: 1, 2, ...]",
+)
+@option(
+    "--free",
+    type=list_of("kr[,kw]", click.STRING),
+    default=KR,
+    show_default=True,
+    help="Stiffness to fit: kr, moment per rotation across an edge and length; kw, force per "
+    "deflection and length.",
+)
+@option(
+    "--edges",
+    type=list_of("EDGE,...", click.STRING),
+    default=",".join(EDGES),
+    show_default=True,
+    help="Edges that share the stiffness.",
+)
 def modes_command(
     deck: Path,
     number: int,
@@ -72,13 +109,35 @@ def modes_command(
     output: Path | None,
     overwrite: bool,
     form: Format,
+    measured: tuple[float, ...] | None,
+    numbers: tuple[int, ...] | None,
+    free: tuple[str, ...],
+    edges: tuple[str, ...],
 ) -> None:
     """Find the natural frequencies and modes of the plate of DECK.
 
     DECK needs no projectile and no program.  Frequencies are in Hz if UNIT names the unit of time.
     The share is the part of a mode in the static flexibility at the impact point; a mode of a small
     share is hardly excited.  Rigid motions of a plate that is not held have the frequency 0.
+
+    --measured fits springs along the edges to frequencies of a tap test, with standard errors, and
+    prints the cards of SPRI.
     """
+    if measured is not None:
+        for value, name in ((picture, "--plot"), (output, "--output"), (held, "--held")):
+            if value:
+                raise click.UsageError(f"{name} is not for --measured")
+        if form is Format.CSV:
+            raise click.UsageError("--format csv is not for --measured")
+        with refusing_errors("; nothing was fitted"):
+            fit = fit_edges(deck, measured, free, edges=edges, of=numbers or (), mass=mass)
+        if form is Format.JSON:
+            echo_json(fit.to_dict())
+        else:
+            echo(fit)
+        return
+    if numbers is not None:
+        raise click.UsageError("--of is for --measured")
     if picture is not None:
         require_matplotlib()
         check_suffix(PictureKind.MODES, picture)
