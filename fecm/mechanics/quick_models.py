@@ -392,13 +392,18 @@ def _value(powers: list[float], s: float) -> float:
     return value
 
 
+def static_energy(force: float, k: float, stiffness: float) -> float:
+    """Return the energy that a static plate and its contact store under a force."""
+    return force**2 / (2.0 * stiffness) + 0.4 * math.cbrt(force**5 / k**2)
+
+
 def static_peak(mass: float, velocity: float, k: float, stiffness: float) -> float:
     """Return the peak force of :func:`static_plate`."""
     energy = 0.5 * mass * velocity**2
     limit = velocity * math.sqrt(stiffness * mass)  # peak without indentation
 
     def missing(force: float) -> float:
-        return force**2 / (2.0 * stiffness) + 0.4 * math.cbrt(force**5 / k**2) - energy
+        return static_energy(force, k, stiffness) - energy
 
     return root(missing, 0.0, limit, 1e-12 * limit)
 

@@ -39,12 +39,12 @@ from fecm.judge.limits import (
 from fecm.judge.validity import joined, of_face, unsafe
 from fecm.mechanics.mesh import rigid_deflections
 from fecm.mechanics.points import shortest_side
-from fecm.mechanics.quick_models import static_peak
+from fecm.mechanics.quick_models import static_energy, static_peak
 from fecm.mechanics.solutions import pull_of_supports
 from fecm.problem.contact_estimates import mean_pressure
 from fecm.problem.estimates import MOST_SOLVED, pushing_compliance
 from fecm.problem.problem import Problem
-from fecm.results.exposures import count_evaluations, largest_exposures
+from fecm.results.exposures import count_evaluations, largest_exposures, threshold_energy
 from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
 from fecm.results.run_metrics import start_w_of, steps_to_decide
@@ -360,9 +360,10 @@ def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
 
 
 def _band_without_pull(problem: Problem, result: Result, held: float) -> str:
-    """Say how much softer a plate is whose supports only push, and what that does to the peak.
+    """Say how much softer a plate is whose supports only push, and what that does to the impact.
 
-    The peaks of both are those of the impact on the static plate, which share the run's peak.
+    The peaks, and the energies at the delamination threshold, have the ratio of those of the impact
+    on the static plate; the run has the value of the plate whose supports pull.
     `held` is the compliance of the plate whose supports pull as well.
     """
     pushed = pushing_compliance(problem)
@@ -371,13 +372,19 @@ def _band_without_pull(problem: Problem, result: Result, held: float) -> str:
     softer = f"the plate is then {pushed / held - 1.0:.1%} more flexible"
     factor, k = problem.symmetry.factor, problem.contact_coefficient
     mass, velocity = problem.projectile_mass, problem.deck.require(Impact).velocity
-    first, second = (
-        static_peak(mass, velocity, k, factor / compliance) for compliance in (held, pushed)
-    )
+    stiffness = factor / held, factor / pushed
+    first, second = (static_peak(mass, velocity, k, each) for each in stiffness)
     peak = float(result["history/force"].max()) * factor
     unit = unit_of("force", result.units)
     low, high = quantity(peak * second / first, unit), quantity(peak, unit)
-    return f"{softer}, and the peak force lies between {low} and {high}"
+    text = f"{softer}, and the peak force lies between {low} and {high}"
+    energy = threshold_energy(result)
+    if math.isnan(energy):  # no DELA, or the force does not reach its threshold
+        return text
+    force, unit = float(result.threshold["force"]), unit_of("force*length", result.units)
+    first, second = (static_energy(force, k, each) for each in stiffness)
+    low, high = quantity(energy, unit), quantity(energy * second / first, unit)
+    return f"{text}, and the energy at the delamination threshold between {low} and {high}"
 
 
 def _gravity(simulation: Simulation, result: Result) -> Iterator[str]:
