@@ -44,8 +44,9 @@ from fecm.mechanics.solutions import pull_of_supports
 from fecm.problem.contact_estimates import mean_pressure
 from fecm.problem.estimates import MOST_SOLVED, pushing_compliance
 from fecm.problem.problem import Problem
-from fecm.results.exposures import count_evaluations, largest_exposures, threshold_energy
+from fecm.results.exposures import count_evaluations, largest_exposures
 from fecm.results.metrics import MOBILITY
+from fecm.results.onset import energy_at_force
 from fecm.results.result import Result
 from fecm.results.run_metrics import start_w_of, steps_to_decide
 from fecm.results.stored import row_blocks
@@ -378,13 +379,16 @@ def _band_without_pull(problem: Problem, result: Result, held: float) -> str:
     unit = unit_of("force", result.units)
     low, high = quantity(peak * second / first, unit), quantity(peak, unit)
     text = f"{softer}, and the peak force lies between {low} and {high}"
-    energy = threshold_energy(result)
-    if math.isnan(energy):  # no DELA, or the force does not reach its threshold
+    if not result.threshold:
         return text
     force, unit = float(result.threshold["force"]), unit_of("force*length", result.units)
+    energy = energy_at_force(result, force)
+    if math.isnan(energy):
+        return text
     first, second = (static_energy(force, k, each) for each in stiffness)
-    low, high = quantity(energy, unit), quantity(energy * second / first, unit)
-    return f"{text}, and the energy at the delamination threshold between {low} and {high}"
+    # As many digits as the summary has of this energy.
+    low, high = quantity(energy, unit, 3), quantity(energy * second / first, unit, 3)
+    return f"{text}, and the impact energy at the delamination threshold between {low} and {high}"
 
 
 def _gravity(simulation: Simulation, result: Result) -> Iterator[str]:
