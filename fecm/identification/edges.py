@@ -2,7 +2,7 @@
 
 Springs along edges resist the rotation across them (kr, moment per rotation and length) and w (kw,
 force per length and deflection).  Their stiffness minimises the squares of the differences of ln f
-over ln k.  With unit modal mass,
+over ln k, from the best of starts over five decades.  With unit modal mass,
 
     d omega^2/dk = phi^T dK/dk phi.
 
@@ -520,7 +520,8 @@ class _Fit:
         """Return the best values; those that no frequency feels are bounds."""
         p = len(self.plate.names)
         starts = [np.log(self.plate.scale * np.array(s)) for s in product(DECADES, repeat=p)]
-        x = self._settled(starts, np.ones(p, dtype=bool))
+        start = min(starts, key=lambda x: float(np.square(self._residual(x)[0]).sum()))
+        x = self._settled(start, np.ones(p, dtype=bool))
         bounds = [self._bound(x, j) for j in range(len(x))]
         felt = np.array([bound is None for bound in bounds])
         if felt.any() and not felt.all():  # the others, with this one at its end
@@ -528,7 +529,7 @@ class _Fit:
             for j, bound in enumerate(bounds):
                 if bound is not None:
                     at_end[j] = self._most[j] if bound[0] == ">" else self._least[j]
-            x = self._settled([at_end], felt)
+            x = self._settled(at_end, felt)
         residual, J = self._residual(x)
         freedom = len(residual) - int(felt.sum())
         variance = float(residual @ residual) / freedom if freedom else math.nan
@@ -561,9 +562,9 @@ class _Fit:
         computed, slopes = self.basis.frequencies(np.exp(x), self.which)
         return self.measured - computed, slopes
 
-    def _settled(self, starts: Sequence[Floats], free: Bools) -> Floats:
-        """Fit the free parameters until basis and whole plate agree."""
-        x = self._least_squares(starts, free)
+    def _settled(self, x: Floats, free: Bools) -> Floats:
+        """Fit the free parameters from a start until basis and whole plate agree."""
+        x = self._least_squares(x, free)
         for _ in range(MOST_ROUNDS):
             squares, shapes = self.plate.whole(np.exp(x))
             error = 0.5 * np.log(squares[self.which]) - self.measured + self._residual(x)[0]
@@ -571,30 +572,24 @@ class _Fit:
                 break
             self._shapes.append(shapes)
             self.basis = RitzBasis(self.plate, np.concatenate(self._shapes))
-            x = self._least_squares([x], free)
+            x = self._least_squares(x, free)
         return x
 
-    def _least_squares(self, starts: Sequence[Floats], free: Bools) -> Floats:
-        """Return the best values from several starts."""
+    def _least_squares(self, start: Floats, free: Bools) -> Floats:
+        """Return the best values of the free parameters in the basis, with the others."""
         from scipy.optimize import least_squares
 
-        best, least = starts[0], math.inf
-        for start in starts:
+        def at(y: Floats) -> tuple[Floats, Floats]:
+            x = start.copy()
+            x[free] = y
+            residual, slopes = self._residual(x)
+            return residual, -slopes[:, free]
 
-            def full(y: Floats, start: Floats = start) -> Floats:
-                x = start.copy()
-                x[free] = y
-                return x
-
-            found = least_squares(
-                lambda y: self._residual(full(y))[0],
-                start[free],
-                lambda y: -self._residual(full(y))[1][:, free],
-                bounds=(self._least[free], self._most[free]),
-            )
-            if found.cost < least:
-                best, least = full(found.x), float(found.cost)
-        return best
+        bounds = self._least[free], self._most[free]
+        found = least_squares(lambda y: at(y)[0], start[free], lambda y: at(y)[1], bounds=bounds)
+        x = start.copy()
+        x[free] = found.x
+        return x
 
     def _bound(self, x: Floats, j: int) -> tuple[str, float] | None:
         """Return a bound of a parameter that no frequency feels; None for one that they feel."""

@@ -13,6 +13,7 @@ from fecm.deck import model
 from fecm.deck.grid import ElementGrid, uniform_section
 from fecm.deck.model import NodeValues, OneSidedSupport, OneSidedSupports, Ply, Springs
 from fecm.deck.support_cards import LINE
+from fecm.identification.edges import KR, KW, fit_edges
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.points import DISC, patch_weights
 from fecm.mechanics.solutions import modes, static_response
@@ -26,6 +27,8 @@ WINDOW_PLY = Ply(1.57e-9, 0.32, 161000.0, 11380.0, 5170.0, 5170.0, 3980.0)
 CROSS = (0.0, 90.0, 0.0, 90.0, 0.0)
 QUASI = 3 * (45.0, 0.0, -45.0, 90.0)
 TURN, LIFT = 1e4, 10.0  # stiffness of the edges per length, of the rotation across them and of w
+# Hz, of p-elements on these edges.
+FREQUENCIES = 349.18913, 562.15961, 781.00559, 906.67897, 919.23708, 1171.04849
 
 
 @case
@@ -39,11 +42,25 @@ def _elastic_edges() -> Sequence[Value]:
     lines = [(first, left, across_x), (right, last, across_x)]
     lines += [(first, right, across_y), (left, last, across_y)]
     edges = Springs(tuple(NodeValues(*ends) for ends in lines), word=LINE)
-    supports = grid.supported((1, 1, 0, 0, 0), {})
-    plies = decks.material(PLY, [*CROSS, *CROSS[::-1]], 0.2)
-    deck = decks.deck(grid, [supports, edges, decks.MITC, plies], ())
+    deck = _plate_of_edges(grid, edges)
     plate = build_plate(deck, generate(deck))
     return list(modes(plate, 2, consistent=False).angular_frequency / (2.0 * math.pi))
+
+
+@case
+def _edge_stiffness() -> Sequence[Value]:
+    """Fit the stiffness of elastic edges to the frequencies of another program."""
+    grid = ElementGrid(uniform_section(300.0, 12), uniform_section(200.0, 8))
+    fit = fit_edges(_plate_of_edges(grid), FREQUENCIES, (KR, KW))
+    return [k.value for k in fit.stiffness]
+
+
+def _plate_of_edges(grid: ElementGrid, *edges: Springs) -> model.Deck:
+    """Build the plate of elastic edges (mm, N, s), held in its plane."""
+    supports = grid.supported((1, 1, 0, 0, 0), {})
+    plies = decks.material(PLY, [*CROSS, *CROSS[::-1]], 0.2)
+    units = model.Units("mm", "N", "s")
+    return decks.deck(grid, [units, supports, *edges, decks.MITC, plies], ())
 
 
 @case

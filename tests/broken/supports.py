@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from fecm.identification import edges
 from fecm.mechanics import solutions
 from fecm.mechanics.plate import PlateModel
 from fecm.problem import supports
@@ -19,6 +20,10 @@ BREAKS: Breaks = {
     "half of the springs": (
         changed(supports, "spring_stiffness", lambda springs: 0.5 * springs),
         {"elastic-edges": ("f",)},
+    ),
+    "edges of half their length": (
+        changed(edges.ElasticPlate, "_lengths", lambda lengths: 0.5 * lengths),
+        {"edge-stiffness": ("k",)},
     ),
     "a window that pulls": (
         instead(solutions, "static_response", held),
