@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,13 @@ import pytest
 
 import fecm
 from fecm.deck.model import Impact, Patch
-from fecm.mechanics.solutions import pull_of_supports, static_stiffness
+from fecm.mechanics.solutions import (
+    compliance,
+    pull_of_supports,
+    static_stiffness,
+    window_compliances,
+)
+from fecm.mechanics.symmetry import with_codes
 from fecm.problem.loading import load_deck
 from fecm.problem.parts import build_projectile
 from fecm.results.summary import run_summary
@@ -278,6 +285,35 @@ def test_clamps_hold_or_spring_the_nodes_nearest_to_their_tips(
     assert len(nodes) == 4
     # Clamps hold the plate down on purpose: they are no window that pulls.
     assert not problem.knife_edges.any()
+
+
+def test_a_new_deck_tells_the_flexibility_of_the_three_kinds_of_its_window() -> None:
+    window = "--window", "push"
+    decks = [
+        new(*TEST, *QUICK, *more).stdout for more in ((), window, (*window, "--clamps", "held"))
+    ]
+    compliances = [load_deck(deck).problems[0].static.compliance for deck in decks]  # type: ignore[union-attr]
+    for deck in decks:  # the comment does not depend on which of them the deck has
+        stated = re.findall(r"([0-9.]+) mm/N", deck)
+        # The supports of a deck that only push give way by 0.1 %.
+        assert list(map(float, stated)) == pytest.approx(compliances, rel=2e-3)
+        shares = [float(share) for share in re.findall(r"\(([+-][0-9.]+)%\)", deck)]
+        held, *others = compliances
+        assert shares == pytest.approx([100.0 * (c / held - 1.0) for c in others], abs=0.25)
+
+
+def test_one_factorisation_gives_the_compliances_of_three_plates_on_a_window() -> None:
+    (problem,) = load_deck(new(*TEST, *QUICK, "--window", "push").stdout).problems
+    plate, contact = problem.moving_plate, problem.contact
+    assert plate.supports is not None
+    assert contact is not None
+    x, y = problem.mesh.coordinates.T
+    tips = np.array([np.hypot(x - a, y - b).argmin() for a in (19, 131) for b in (6, 94)])
+    codes = plate.mesh.codes.copy()
+    codes[tips, 2] = 1
+    closed = replace(plate, supports=plate.supports.held())
+    expected = [compliance(p, contact) for p in (closed, plate, with_codes(plate, codes))]
+    assert window_compliances(plate, contact, tips) == pytest.approx(expected, rel=1e-9)
 
 
 def test_the_note_of_a_window_that_pulls_has_the_band_that_a_pushing_window_confirms() -> None:

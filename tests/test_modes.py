@@ -17,6 +17,7 @@ import fecm
 from fecm.authoring.plate import Support
 from fecm.deck import model
 from fecm.deck.model import Boundary, Deck, NodeCodes, NodeValues, OneSidedSupport, Springs
+from fecm.mechanics.projectile import MASSES
 from fecm.problem.generate import generate
 from tests.builders import table
 from tests.calls import call
@@ -70,6 +71,27 @@ def test_hertz_do_not_depend_on_the_unit_of_time() -> None:
     in_milliseconds = fecm.modes(deck, 3)
     assert in_milliseconds.frequency == pytest.approx(in_seconds.frequency, rel=1e-6)
     assert in_milliseconds.period == pytest.approx(1e3 * in_seconds.period, rel=1e-6)
+
+
+def test_the_consistent_mass_has_other_frequencies_that_agree_with_the_other_program() -> None:
+    row = table("elastic_edges.csv")[0]
+    lumped, consistent = (fecm.modes(plate(), 3, mass=m).frequency for m in MASSES)
+    expected = [float(row[f"f{n}_Hz"]) for n in range(1, 4)]
+    assert consistent == pytest.approx(expected, rel=2e-3)
+    assert (consistent > lumped).all()
+
+
+def test_a_plate_that_stretches_has_the_modes_of_small_bending() -> None:
+    linear, stretches = (
+        fecm.modes(plate(mesh=(4, 4), patch="disc:60", kinematics=k), 200)
+        for k in ("linear", "von-karman")
+    )
+    assert stretches.frequency == pytest.approx(linear.frequency, rel=1e-9)  # no mode in the plane
+
+
+def test_shapes_with_oblique_nodal_lines_have_no_numbers_of_lines() -> None:
+    found = fecm.modes(plate(layup="[45]10"), 3)
+    assert found.nodal_lines == ((0, 0), None, None)
 
 
 def test_the_shares_of_all_modes_are_the_whole_flexibility() -> None:

@@ -247,7 +247,7 @@ def _on_fixture(
 ) -> Iterator[Segment]:
     """Yield the segments of a window and its clamps."""
     pushes = fixture.support == PUSH
-    tips = sorted({mesh.nearest(*place)[0] for place in fixture.tips})
+    tips = [] if fixture.clamps is None else tips_on(mesh, fixture)
     held = tips if fixture.clamps == HELD else []
     boundary = mesh.supported(
         everywhere, {}, fixture.window, in_plane=in_plane, holds_w=not pushes, points=held
@@ -262,6 +262,11 @@ def _on_fixture(
         check_positive(clamps=stiffness)
         values = (0.0, 0.0, float(stiffness or 0.0), 0.0, 0.0)
         yield Springs(tuple(NodeValues(node, 0, values) for node in tips))
+
+
+def tips_on(mesh: AnyMesh, fixture: Fixture) -> list[int]:
+    """Return the nodes, from 1, nearest to the tips of the clamps of a fixture."""
+    return sorted({mesh.nearest(*place)[0] for place in fixture.tips})
 
 
 def _note_of_curved(plate: Plate, in_plane: InPlane) -> str:

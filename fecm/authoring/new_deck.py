@@ -51,9 +51,11 @@ from fecm.authoring.mesh import (
     curvature_of,
     place_impact,
     support_plate,
+    tips_on,
 )
 from fecm.authoring.numerics import (
     SupportedDeck,
+    band_comment,
     chosen_time_step,
     contact_patch,
     shear_segment,
@@ -344,8 +346,12 @@ def author(options: ImpactOptions) -> Authored:
     )
     dt = motion.dt or chosen_time_step(options, structure.deck)
     doubts += _doubts_of_duration(motion.duration, dt, plies.system)
-    deck = with_impact_program(options, structure.deck, dt, motion.duration)
-    comments = (fixture.comment if fixture else "") + structure.comment + comment
+    deck = with_impact_program(options, structure, dt, motion.duration)
+    comments = structure.comment + comment
+    if fixture is not None:
+        names = units_of(plies.system) if plies.system else {}
+        band = band_comment(structure, tips_on(mesh, fixture), names)
+        comments = fixture.comment + band + comments
     return Authored(deck, comments, [*notes, *structure.notes], doubts)
 
 

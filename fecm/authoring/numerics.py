@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
+
+import numpy as np
 
 from fecm.authoring.contact import parse_patch
 from fecm.authoring.deck_options import (
@@ -23,11 +25,16 @@ from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck import model
 from fecm.deck.macros import EXTENDED, TESTS, steps_of_plies, with_outputs
 from fecm.deck.model import Allowables, Deck, Macro, Patch, Shear
+from fecm.deck.units import quantity, unit_of
 from fecm.judge.validity import IN_PLANE_WORDS
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.points import HERTZ
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
-from fecm.problem.estimates import contact_duration, static_deflection
+from fecm.problem.estimates import (
+    compliances_on_window,
+    contact_duration,
+    static_deflection,
+)
 from fecm.problem.generate import generate
 from fecm.problem.loading import load_deck
 from fecm.problem.parts import build_plate, has_assumed_shear
@@ -107,19 +114,19 @@ def impact_program(
 
 
 def with_impact_program(
-    options: ImpactOptions, deck: Deck, dt: float, duration: float | None
+    options: ImpactOptions, structure: SupportedDeck, dt: float, duration: float | None
 ) -> Deck:
     """Return the deck with its program. By default it ends once the impact is over.
 
     With `damage` and strengths the program also stores ply stresses around the load.
     """
+    deck = structure.deck
     with_plies = options.damage and deck.has(Allowables)
     elements, until_over = None, duration is None
     if duration is None or with_plies:
-        loaded = load_deck(replace(deck, macros=impact_program(options, deck, dt, dt)))
-        if loaded.errors():  # the deck is refused later
+        problem = structure.problem or problem_of(deck)
+        if problem is None:  # the deck is refused later
             return replace(deck, macros=impact_program(options, deck, dt, duration or dt))
-        (problem,) = loaded.problems
         duration = contact_duration(problem) if duration is None else duration
         elements = elements_around_load(problem) if with_plies else None
     macros = impact_program(options, deck, dt, duration, elements, until_over=until_over)
@@ -150,6 +157,7 @@ class SupportedDeck(NamedTuple):
     deck: model.Deck
     comment: str  # comment lines about a window
     notes: list[str]
+    problem: Problem | None = None  # of one short step, if the choice of the kinematics needed it
 
 
 def with_kinematics(
@@ -175,7 +183,11 @@ def with_kinematics(
             f"the plate is linear: its static deflection is computed up to {MOST_ELEMENTS} "
             "elements only; `kinematics` von-karman adds the stretching (NONL)",
         )
-    ratio = _deflection_over_thickness(linear.deck)
+    problem = problem_of(linear.deck)
+    if problem is None:  # the deck is refused later
+        return linear
+    linear = linear._replace(problem=problem)
+    ratio = static_deflection(problem) / problem.judge.thickness
     if not ratio > LIMIT:
         return linear
     estimate = f"the static estimate of the deflection is {ratio:.2g} h, beyond {LIMIT:g} h"
@@ -189,7 +201,7 @@ def with_kinematics(
     (problem,) = loaded.problems
     edges = IN_PLANE_WORDS.get(problem.judge.in_plane, "u and v held at every node")
     return _with_note(
-        nonlinear,
+        nonlinear._replace(problem=problem),
         f"{estimate}: the plate stretches as it bends (NONL), {edges}; `kinematics` linear leaves "
         "it out",
     )
@@ -199,10 +211,31 @@ def _with_note(structure: SupportedDeck, note: str) -> SupportedDeck:
     return structure._replace(notes=[*structure.notes, note])
 
 
-def _deflection_over_thickness(deck: model.Deck) -> float:
-    """Estimate the largest static deflection over the thickness; 0 for a deck with errors."""
+def problem_of(deck: model.Deck) -> Problem | None:
+    """Return the problem of one short step of a deck; None for a deck with errors."""
     loaded = load_deck(replace(deck, macros=BRIEF))
-    if loaded.errors():  # the deck is refused later
-        return 0.0
-    (problem,) = loaded.problems
-    return static_deflection(problem) / problem.judge.thickness
+    return None if loaded.errors() else loaded.problems[0]
+
+
+def band_comment(structure: SupportedDeck, tips: Sequence[int], names: dict[str, str]) -> str:
+    """Return comment lines with the static flexibility of a plate on a window, held and pushed.
+
+    `tips` are the nodes, from 1, of the tips of clamps, and `names` those of the units. A deck with
+    errors and a very fine mesh have no such lines.
+    """
+    if structure.deck.control.numel > MOST_ELEMENTS:
+        return ""
+    problem = structure.problem or problem_of(structure.deck)
+    if problem is None:
+        return ""
+    found = compliances_on_window(problem, np.array(tips, dtype=int) - 1)
+    if found is None:
+        return ""
+    unit, factor = unit_of("length/force", names), problem.symmetry.factor
+    held, pushed, clamped = (quantity(value / factor, unit) for value in found)
+    softer, stiffer = (f"{value / found.held - 1.0:+.1%}" for value in found[1:])
+    with_clamps = f", with clamps that hold the corners {clamped} ({stiffer})" if tips else ""
+    return (
+        f"! Static flexibility: {held} with w = 0 along the window; on a window that only pushes\n"
+        f"! {pushed} ({softer}){with_clamps}.\n"
+    )

@@ -64,8 +64,8 @@ class Fixture(NamedTuple):
 
     @property
     def tips(self) -> list[tuple[float, float]]:
-        """Places of the tips of the clamps."""
-        if self.clamp is None or self.clamps is None:
+        """Places of the tips of clamps, modelled or not."""
+        if self.clamp is None:
             return []
         (lx, ly), (x, y) = self.size, self.clamp
         return [(x, y), (lx - x, y), (x, ly - y), (lx - x, ly - y)]

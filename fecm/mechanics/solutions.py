@@ -11,7 +11,7 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._machine import require_memory
-from fecm._typing import Floats, Indices
+from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.element_matrices import geometric_stiffness
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.membrane import MembraneForces, tangent
@@ -283,38 +283,98 @@ def static_response(plate: PlateModel, contact: Floats) -> StaticResponse:
     supports = None if plate.supports is None else plate.supports.without_gaps()
     if supports is None or not plate.lifts:
         return StaticResponse(reduction.field(u), float(load @ u), supports)
-    one_sided = supports.select(supports.is_one_sided)
-    keys = np.column_stack([reduction.index[one_sided.node, W], one_sided.side])
-    (dofs, side), which = _distinct(keys)
-    stiffness = np.bincount(which, one_sided.stiffness)
-    unit = np.zeros((len(load), len(dofs)))
-    unit[dofs, np.arange(len(dofs))] = 1.0
-    Z = tangent.approximate(unit)
-    G, c = Z[dofs], u[dofs]
-    is_open = np.zeros(len(dofs), dtype=bool)
-    for _ in range(MOST_ACTIVE_SETS):
-        compliances = 1.0 / stiffness[is_open]
-        resistance = np.diag(compliances) - G[np.ix_(is_open, is_open)]
-        if not _resists(resistance, compliances):
-            raise SingularStiffnessError("the plate tips off its one-sided supports")
-        opened = np.linalg.solve(resistance, c[is_open])
-        opens = side * (c + G[:, is_open] @ opened) < 0.0
-        if np.array_equal(opens, is_open):
-            displacement = u + Z[:, is_open] @ opened
-            closed = ~supports.is_one_sided
-            closed[supports.is_one_sided] = ~is_open[which]
-            field = reduction.field(displacement)
-            return StaticResponse(field, float(load @ displacement), supports.select(closed))
-        is_open = opens
-    raise ConvergenceError(
-        f"the one-sided supports (UNIL) open and close in turns after {MOST_ACTIVE_SETS} solutions"
+    rows = _one_sided_dofs(supports, reduction)
+    Z = tangent.approximate(_unit_forces(rows.dofs, len(load)))
+    is_open, opened = rows.opened(Z[rows.dofs], u[rows.dofs])
+    displacement = u + Z[:, is_open] @ opened
+    closed = ~supports.is_one_sided
+    closed[supports.is_one_sided] = ~is_open[rows.which]
+    field = reduction.field(displacement)
+    return StaticResponse(field, float(load @ displacement), supports.select(closed))
+
+
+class WindowCompliances(NamedTuple):
+    """Static displacement per force of a plate on a window, with three kinds of supports."""
+
+    held: float  # the window holds w
+    pushed: float  # the window only pushes
+    clamped: float  # the window only pushes, and clamps hold w at their tips
+
+
+def window_compliances(plate: PlateModel, contact: Floats, tips: Indices) -> WindowCompliances:
+    """Compute the compliances of a plate whose one-sided supports are a window, (numnp, 5) forces.
+
+    `tips` are the nodes, from 0, of the tips of clamps.  One factorisation serves the three: the
+    forces that hold the tips make the clamped plate's G and c of :func:`static_response`, which
+    raises the same errors.
+    """
+    assert plate.supports is not None
+    reduction = symmetry_reduction(replace(plate, nonlinear=False), contact)
+    load = reduction.gather(contact)
+    tangent = Tangent(plate, reduction=reduction, held=True)
+    u = tangent.solve(load)
+    rows = _one_sided_dofs(plate.supports, reduction)
+    dofs = np.concatenate([rows.dofs, np.unique(reduction.index[tips, W])])
+    G, c, held = tangent.approximate(_unit_forces(dofs, len(load)))[dofs], u[dofs], float(load @ u)
+    window, tip = np.split(np.arange(len(dofs)), [len(rows.dofs)])
+
+    def pushed(compliance: float, G: Floats, c: Floats) -> float:
+        is_open, opened = rows.opened(G, c)
+        return compliance + float(c[is_open] @ opened)
+
+    holding = np.linalg.solve(G[np.ix_(tip, tip)], G[tip]).T
+    clamped = pushed(
+        held - float(c[tip] @ np.linalg.solve(G[np.ix_(tip, tip)], c[tip])),
+        (G - holding @ G[tip])[np.ix_(window, window)],
+        (c - holding @ c[tip])[window],
     )
+    return WindowCompliances(held, pushed(held, G[np.ix_(window, window)], c[window]), clamped)
 
 
-def _distinct(keys: Floats) -> tuple[tuple[Indices, Floats], Indices]:
-    """Return distinct pairs of a dof and a side, and the pair of each row."""
+class _OneSidedDofs(NamedTuple):
+    """One-sided supports by dof and side: several rows of one node and side are one."""
+
+    dofs: Indices  # independent dofs, (n,)
+    side: Floats  # (n,)
+    compliances: Floats  # 1/k, (n,)
+    which: Indices  # of each row of supports that is one-sided
+
+    def opened(self, G: Floats, c: Floats) -> tuple[Bools, Floats]:
+        """Return the supports that the load opens, (n,), and the forces that open them.
+
+        G and c, and the errors, are those of :func:`static_response`.
+        """
+        is_open = np.zeros(len(c), dtype=bool)
+        for _ in range(MOST_ACTIVE_SETS):
+            compliances = self.compliances[is_open]
+            resistance = np.diag(compliances) - G[np.ix_(is_open, is_open)]
+            if not _resists(resistance, compliances):
+                raise SingularStiffnessError("the plate tips off its one-sided supports")
+            opened = np.linalg.solve(resistance, c[is_open])
+            opens = self.side * (c + G[:, is_open] @ opened) < 0.0
+            if np.array_equal(opens, is_open):
+                return is_open, opened
+            is_open = opens
+        raise ConvergenceError(
+            "the one-sided supports (UNIL) open and close in turns after "
+            f"{MOST_ACTIVE_SETS} solutions"
+        )
+
+
+def _one_sided_dofs(supports: NodeSupports, reduction: SymmetryReduction) -> _OneSidedDofs:
+    """Return the distinct pairs of a dof and a side of the one-sided supports."""
+    rows = supports.select(supports.is_one_sided)
+    keys = np.column_stack([reduction.index[rows.node, W], rows.side])
     pairs, which = np.unique(keys, axis=0, return_inverse=True)
-    return (pairs[:, 0].astype(np.intp), pairs[:, 1]), which.ravel()
+    compliances = 1.0 / np.bincount(which.ravel(), rows.stiffness)
+    return _OneSidedDofs(pairs[:, 0].astype(np.intp), pairs[:, 1], compliances, which.ravel())
+
+
+def _unit_forces(dofs: Indices, count: int) -> Floats:
+    """Return unit forces on dofs, (count, dofs)."""
+    unit = np.zeros((count, len(dofs)))
+    unit[dofs, np.arange(len(dofs))] = 1.0
+    return unit
 
 
 def _resists(resistance: Floats, compliances: Floats) -> bool:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._errors import FecmError
-from fecm._typing import Indices
+from fecm._typing import Bools, Indices
 from fecm.deck import model
 from fecm.deck.model import Impact
 from fecm.judge.exposure_bands import LoadMesh
@@ -22,6 +22,7 @@ from fecm.judge.limits import ELEMENTS_PER_WAVE
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.laminate import effective_rigidity
 from fecm.mechanics.mesh import longest_sides
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.quick_models import (
     StaticCurve,
     contact_time_on_curve,
@@ -29,7 +30,13 @@ from fecm.mechanics.quick_models import (
     static_peak,
     static_plate,
 )
-from fecm.mechanics.solutions import ConvergenceError, SingularStiffnessError, static_response
+from fecm.mechanics.solutions import (
+    ConvergenceError,
+    SingularStiffnessError,
+    WindowCompliances,
+    static_response,
+    window_compliances,
+)
 from fecm.mechanics.supports import one_sided
 from fecm.mechanics.symmetry import with_codes
 from fecm.problem.contact_estimates import wave_impedance
@@ -41,6 +48,7 @@ MOST_ERROR = 0.5  # largest mesh error of the peak that is estimated
 NINE_NODES = 9
 CORNERS = 4  # of an element of nine nodes, its first ones
 SAME_PLACE = 0.01  # distance from a corner over the side up to which a load is at the corner
+RIGID = 100.0  # times the default stiffness of UNIL: within 1e-5 of restraints that hold w
 FULL = 3  # shear order at which 9-node elements have no zero-energy modes
 
 
@@ -232,25 +240,59 @@ def pushing_compliance(problem: Problem) -> float:
 
     The edges have the default stiffness of UNIL. The compliance is NaN if the plate tips off them.
     """
-    plate, contact, edges = problem.moving_plate, problem.contact, problem.knife_edges
+    contact, edges = problem.contact, problem.knife_edges
     assert contact is not None  # the program has impact steps
+    try:
+        return static_response(_on_pushing_edges(problem, edges), contact).compliance
+    except (SingularStiffnessError, ConvergenceError):
+        return math.nan
+
+
+def compliances_on_window(problem: Problem, tips: Indices) -> WindowCompliances | None:
+    """Return the static compliances of a plate on the window of a fixture, for the part of a deck.
+
+    The deck has its supports: held, or pushing with clamps or without. `tips` are the nodes, from
+    0, of the tips of clamps. Without a load, and where the plate tips off the window, there are
+    none.
+    """
+    contact, edges = problem.contact, problem.knife_edges.copy()
+    assert contact is not None  # the program has impact steps
+    supports = problem.plate.supports
+    if supports is not None:
+        edges[supports.node[supports.is_one_sided]] = True
+    at_tips = np.zeros_like(edges)
+    at_tips[tips] = True
+    try:
+        plate = _on_pushing_edges(problem, edges, at_tips, RIGID)
+        return window_compliances(plate, contact, tips)
+    except (SingularStiffnessError, ConvergenceError):
+        return None
+
+
+def _on_pushing_edges(
+    problem: Problem, edges: Bools, released: Bools | None = None, factor: float = 1.0
+) -> PlateModel:
+    """Return the moving plate with one-sided supports at the nodes `edges`, (numnp,).
+
+    They have the default stiffness of UNIL times a factor, and take the place of what holds w
+    there, and at the nodes `released`.
+    """
+    plate, contact = problem.moving_plate, problem.contact
+    assert contact is not None
+    freed = edges if released is None else edges | released
     codes = plate.mesh.codes.copy()
-    codes[edges, W] = 0
+    codes[freed, W] = 0
     springs = plate.supports
     if springs is not None:
-        is_edge = edges[springs.node] & (springs.dof == W) & ~springs.is_one_sided
-        springs = springs.select(~is_edge)
+        springs = springs.select(~(freed[springs.node] & (springs.dof == W)))
     free = replace(with_codes(plate, codes), supports=springs)
     (nodes,) = np.nonzero(edges)
-    stiffness = default_stiffness(free, problem.safe_time_step)[nodes]
+    stiffness = factor * default_stiffness(free, problem.safe_time_step)[nodes]
     side = np.full(len(nodes), np.sign(contact[:, W].sum()))
     supports = one_sided(nodes, side, stiffness, np.zeros(len(nodes)))
     if springs is not None:
         supports = supports.joined(springs)
-    try:
-        return static_response(replace(free, supports=supports), contact).compliance
-    except (SingularStiffnessError, ConvergenceError):
-        return math.nan
+    return replace(free, supports=supports)
 
 
 def contact_duration(problem: Problem) -> float:
