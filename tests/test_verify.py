@@ -18,7 +18,7 @@ from fecm.mechanics import element_matrices
 from fecm.mechanics import laminate as laminates
 from fecm.mechanics.contact_law import LinearPermanent
 from fecm.problem.generate import generate
-from fecm.verification import CASES, chosen, compute_rows, stretching
+from fecm.verification import CASES, chosen, compute_rows, stretching, supports
 from fecm.verification.case import HEAD, Case, Check, Label, Row, cells, verification_page
 from fecm.verification.decks import report_impact
 from tests import closed_forms
@@ -169,8 +169,22 @@ STATED = {
     "static-bending", "frequencies", "wave-fronts", "dispersion", "rod-pulse", "infinite-plate",
     "supported-plate", "patch-impact", "failure", "cured-failure", "small-mass", "large-mass",
     "contact-coefficient", "stretching-plate", "stretching-disc", "stretching-impact", "sandwich",
-    "curved-panel", "curved-impact", "location", "elastic-edges", "pushing-window",
+    "curved-panel", "curved-impact", "location", "elastic-edges", "edge-stiffness",
+    "pushing-window",
 }  # fmt: skip
+
+
+def test_the_figures_of_elastic_edges_are_those_of_the_other_program() -> None:
+    (row,) = (
+        r for r in table("elastic_edges.csv")
+        if (float(r["k_r_Nmm_per_rad_mm"]), float(r["k_w_N_per_mm2"])) == (1e4, 10.0)
+    )  # fmt: skip
+    stated = [float(row[f"f{n}_Hz"]) for n in range(1, 7)]
+    assert list(supports.FREQUENCIES) == stated
+    (edges,) = chosen(["elastic-edges"])
+    assert [check.expected for check in edges.checks] == stated[:2]
+    (stiffness,) = chosen(["edge-stiffness"])
+    assert [check.expected for check in stiffness.checks] == [1e4, 10.0]
 
 
 @pytest.mark.parametrize("one", CASES, ids=lambda one: one.name)
