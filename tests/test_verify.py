@@ -176,7 +176,7 @@ STATED = {
 
 def test_the_figures_of_elastic_edges_are_those_of_the_other_program() -> None:
     (row,) = (
-        r for r in table("elastic_edges.csv")
+        r for r in reference("elastic_edges.csv")
         if (float(r["k_r_Nmm_per_rad_mm"]), float(r["k_w_N_per_mm2"])) == (1e4, 10.0)
     )  # fmt: skip
     stated = [float(row[f"f{n}_Hz"]) for n in range(1, 7)]
