@@ -18,6 +18,7 @@ import pytest
 
 import fecm
 from fecm import Result
+from fecm._table import ShownNumber
 from fecm.deck import model
 from fecm.deck.model import (
     Deck,
@@ -27,6 +28,7 @@ from fecm.deck.model import (
     PointMasses,
     Springs,
 )
+from fecm.judge.limits import Judgement, TrustLevel
 from fecm.mechanics.solutions import modes, static_response
 from fecm.mechanics.stiffness_product import internal_force_operator
 from fecm.mechanics.supports import NodeSupports
@@ -35,6 +37,8 @@ from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.plot.mesh import Support, support_masks
 from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
+from fecm.problem.summary import deck_summary
+from fecm.report.trust import deck_problem, judgements
 from fecm.results.summary import about_run, run_summary
 from tests.builders import Floats, table
 
@@ -458,3 +462,68 @@ def test_the_picture_of_the_mesh_marks_springs_and_one_sided_supports() -> None:
     on_window |= ((y == 12.5) | (y == 87.5)) & (x >= 12.5) & (x <= 137.5)
     assert (masks[Support.ONE_SIDED] == on_window).all()
     assert not masks[Support.W_HELD].any()
+
+
+# Check and report --------------------------------------------------------------------------------
+
+
+def test_the_check_says_how_soft_the_supports_are_and_what_they_take_of_the_step() -> None:
+    stiff = problem_of(with_segments(free_plate((12, 8)), pushing((12, 8), 1e9)))
+    soft = problem_of(with_segments(free_plate((12, 8)), pushing((12, 8), 1e4)))
+    assert soft.static is not None
+    assert stiff.static is not None
+    exact = soft.static.compliance / stiff.static.compliance - 1.0
+    summary = deck_summary(soft).supports
+    assert summary is not None
+    assert summary["one_sided"] is not None
+    assert summary["one_sided"]["flexibility_gain"] == pytest.approx(exact, rel=0.05)
+    assert summary["one_sided"]["number"] == 2 * (20 + 12)  # sides of 10 and 6 elements
+    alone = problem_of(free_plate((12, 8))).critical_time_step
+    for problem in (soft, stiff):
+        summary = deck_summary(problem).supports
+        assert summary is not None
+        expected = min(1.0, problem.critical_time_step / alone)
+        assert summary["step_ratio"] == pytest.approx(expected, rel=1e-4)
+    assert summary["step_ratio"] < 0.5
+    assert deck_summary(problem_of(free_plate((12, 8)))).supports is None
+
+
+def test_the_stiffness_that_a_warning_names_is_enough() -> None:
+    def stiffness(k: float) -> float:
+        loaded = load_deck(with_segments(free_plate((12, 8)), pushing((12, 8), k)))
+        hints = [finding.hint for finding in loaded.findings if finding.code == "W578"]
+        return float(re.findall(r"stiffness of (\S+) per length", str(hints[0]))[0]) if hints else k
+
+    enough = stiffness(500.0)
+    assert enough > 500.0
+    assert stiffness(enough) == enough
+    assert stiffness(0.9 * enough) > 0.9 * enough
+
+
+def pulls(*segments: model.Segment) -> list[Judgement]:
+    """What a page says about the pull of supports."""
+    result = run(with_segments(free_plate((12, 8), duration=5e-4), *segments))
+    judged = judgements(result, deck_problem(result)[0])
+    return [judgement for judgement in judged if judgement.name.startswith("pull")]
+
+
+def test_a_page_doubts_supports_that_pull_by_more_than_a_tenth_of_the_force() -> None:
+    (window,) = pulls(pulling_too((12, 8)))
+    assert window.level is TrustLevel.DOUBTFUL
+    assert "can only push" in window.words
+    (pushed,) = pulls(pushing((12, 8)))
+    assert pushed.level is TrustLevel.WITHIN
+    assert pushed.size == ShownNumber(0.0, "0 %")
+    tips = tuple(NodeValues(node, 0, (0.0, 0.0, 1e4, 0.0, 0.0)) for node in (28, 48, 378, 398))
+    (clamped,) = pulls(pushing((12, 8)), Springs(tips))
+    assert clamped.level is TrustLevel.DOUBTFUL
+    assert "preload" in clamped.words
+
+
+def test_an_edge_that_springs_hold_against_rotation_may_pull() -> None:
+    k = (0.0, 0.0, 1e4, 1e4, 1e4)
+    lines = tuple(NodeValues(first, last, k) for first, last in window_lines((12, 8)))
+    (edge,) = pulls(Springs(lines, word="LINE"))
+    assert edge.level is TrustLevel.WITHIN
+    assert isinstance(edge.size, ShownNumber)
+    assert edge.size.value > 0.1

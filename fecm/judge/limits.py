@@ -291,6 +291,12 @@ PULL = ModelLimit(
     note="the supports pull the plate down with {pull:.0%} of a static load at the impact; a "
     "window or a ring can only push: {band}",
     remedy="fecm new --window push models it, with --clamps the clamps of a standard",
+    page="a window or a ring can only push: fecm new --window push",
+)
+CLAMPS_PULL = ModelLimit(
+    "pull of the supports over the peak force",
+    0.1,
+    page="clamps hold it up to their preload, which is left out",
 )
 GRAVITY = ModelLimit(
     "rise of the force by gravity",

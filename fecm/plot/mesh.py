@@ -12,11 +12,13 @@ from matplotlib.collections import LineCollection, PolyCollection
 
 from fecm._typing import Bools
 from fecm.deck.model import Impact
+from fecm.mechanics.interpolation import W
 from fecm.mechanics.projectile import Rod
 from fecm.plot import data, style
 from fecm.plot.kinds import Picture, PlotError, Width
 from fecm.plot.plate import aspect, draw_circle
 from fecm.problem.parts import build_projectile, rod_of_deck
+from fecm.problem.supports import point_masses
 from fecm.results.result import Result
 from fecm.results.summary import radii_of
 
@@ -34,6 +36,7 @@ class Support(StrEnum):
     ONE_SIDED = "pushes only"
 
 
+RESTRAINTS = (Support.CLAMPED, Support.W_HELD, Support.ROTATION_HELD)
 HOLLOW: style.Look = {"mfc": "white", "mew": 0.7}
 FAINT = 0.45  # opacity of the laminates' colours below the mesh
 # Marks of the supports.
@@ -44,6 +47,7 @@ MARKS: dict[Support, style.Look] = {
     Support.SPRING: {"marker": "D", "color": style.COLOURS[3], "ms": 3.0},
     Support.ONE_SIDED: HOLLOW | {"marker": "v", "color": style.COLOURS[0], "ms": 3.5},
 }
+MASS: style.Look = {"marker": "o", "color": "0.2", "ms": 4.0, "ls": "none"}  # of a point mass
 
 
 def support_masks(result: Result) -> dict[Support, Bools]:
@@ -73,6 +77,12 @@ def support_masks(result: Result) -> dict[Support, Bools]:
     }
 
 
+def masses(result: Result, name: str) -> Bools:
+    """Return the nodes with point masses, (numnp,)."""
+    numnp = len(result["mesh/coordinates"])
+    return np.asarray(point_masses(data.result_deck(result, name), numnp)[:, W] > 0.0)
+
+
 def mesh_picture(
     results: Mapping[str, Result],
     *,
@@ -80,7 +90,7 @@ def mesh_picture(
     projectile: bool = False,
     width: Width = "column",
 ) -> Picture:
-    """Draw elements, supports, impact point, contact patch, and the points `at`.
+    """Draw elements, supports, point masses, impact point, contact patch, and the points `at`.
 
     With `projectile`, the elements of the rod are drawn below.
     """
@@ -115,7 +125,7 @@ def mesh_picture(
 def draw_plate(
     axes: Axes, result: Result, name: str, cut: data.Patches, colour: str = "0.4"
 ) -> None:
-    """Draw elements with lines of a colour, supports, impact point and contact patch."""
+    """Draw elements with lines of a colour, supports, masses, impact point and contact patch."""
     _colour_laminates(axes, result, name, cut)
     sides = [cut.points[edge] for edge in cut.edges]
     axes.add_collection(LineCollection(sides, colors=colour, linewidths=0.4))
@@ -123,6 +133,9 @@ def draw_plate(
         if nodes.any():
             x, y = result["mesh/coordinates"][nodes, :2].T
             axes.plot(x, y, ls="none", clip_on=False, label=support, **MARKS[support])
+    if (with_mass := masses(result, name)).any():
+        x, y = result["mesh/coordinates"][with_mass, :2].T
+        axes.plot(x, y, clip_on=False, label="point mass", **MASS)
     _mark_load(axes, result, name)
 
 

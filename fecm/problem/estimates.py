@@ -34,6 +34,7 @@ from fecm.mechanics.solutions import (
     ConvergenceError,
     SingularStiffnessError,
     WindowCompliances,
+    pull_of_supports,
     static_response,
     window_compliances,
 )
@@ -151,6 +152,8 @@ def format_mesh_error(error: float) -> str:
     return f"mesh error of the peak about {error:.1%}"
 
 
+# Share of the static deflection at the peak force from which on the supports carry the force.
+NEARLY_STATIC = 0.5
 MOST_SOLVED = 1000  # elements up to which checks and notes take static solutions
 # First step of a static curve: a fraction of the linear plate's deflection, and of the thickness.
 CURVE_STEPS = 20
@@ -233,6 +236,30 @@ def whole_stiffness(problem: Problem) -> float:
     """Return the static stiffness of the whole plate under its load; NaN for a free plate."""
     response = problem.static
     return math.nan if response is None else problem.symmetry.factor / response.compliance
+
+
+def pull_of_edges(problem: Problem, force: float, deflection: float) -> float:
+    """Return the share of a static load with which the knife edges pull; 0 if they do not.
+
+    A light projectile is gone before its wave reaches the supports, so that the share is 0 unless
+    the deflection at the peak force is near the static one.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem of an impact.
+    force, deflection : float
+        Contact force and deflection under the load at the peak force, of the part of a deck.
+    """
+    contact = problem.contact
+    if contact is None or not force > 0.0 or problem.deck.control.numel > MOST_SOLVED:
+        return 0.0
+    if not problem.knife_edges.any() or (response := problem.static) is None:
+        return 0.0
+    if not deflection > NEARLY_STATIC * force * response.compliance:
+        return 0.0
+    forces = pull_of_supports(problem.moving_plate, response, contact)
+    return float(forces[problem.knife_edges].sum())
 
 
 def pushing_compliance(problem: Problem) -> float:

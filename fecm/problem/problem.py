@@ -193,20 +193,28 @@ class Problem:
             return None
 
     @cached_property
+    def rests(self) -> Bools:
+        """Nodes whose w is held both ways, and whose rotations are free, (numnp,).
+
+        Springs hold w and rotations too. Such a node stands for a window, a ring, a knife edge or
+        the tip of a clamp.
+        """
+        free = self.moving_plate.mesh.equations > 0
+        turns = np.asarray((free | self.symmetry.held(self.mesh))[:, W + 1 :].all(axis=1))
+        held = ~free[:, W]
+        if (supports := self.moving_plate.supports) is not None:
+            springs = supports.select(~supports.is_one_sided)
+            held[springs.node[springs.dof == W]] = True
+            turns[springs.node[springs.dof > W]] = False
+        return np.asarray(held & turns)
+
+    @cached_property
     def knife_edges(self) -> Bools:
         """Nodes on lines that hold w both ways, but no rotation, (numnp,).
 
         Such a line stands for a ring, a window or a knife edge, which can only push.
         """
-        plate, free = self.moving_plate, self.moving_plate.mesh.equations > 0
-        turns = (free | self.symmetry.held(self.mesh))[:, W + 1 :].all(axis=1)
-        held = ~free[:, W]
-        if plate.supports is not None:
-            springs = plate.supports.select(
-                ~plate.supports.is_one_sided & (plate.supports.dof == W)
-            )
-            held[springs.node] = True
-        rests = held & turns
+        rests = self.rests
         on_line = np.zeros(len(rests), dtype=bool)
         lines = self.sides.take(np.asarray(rests[self.sides.ends].all(axis=1)))
         on_line[lines.nodes[lines.nodes >= 0]] = True

@@ -29,6 +29,7 @@ from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.estimates import MOST_SOLVED, format_mesh_error, resolution
 from fecm.problem.problem import Problem
 from fecm.problem.rules.preload import FEWEST_ELEMENTS
+from fecm.problem.support_summary import SupportsSummary, support_rows, supports_summary
 from fecm.results.stored import whole_plate
 
 ROOM = 0.6  # share of the critical time step below which the step that DT 0 takes is shown
@@ -147,6 +148,8 @@ class ProblemSummary:
         are of the whole plate.
     symmetry_lines : str
         Lines of symmetry through the impact node; empty without.
+    supports : dict or None
+        Springs, one-sided supports and point masses; None without SPRI, UNIL and MASS.
     """
 
     title: str
@@ -186,6 +189,7 @@ class ProblemSummary:
     delaminations: int
     symmetry_factor: int
     symmetry_lines: str
+    supports: SupportsSummary | None
 
     def to_dict(self) -> dict[str, object]:
         """Return plain values, for JSON."""
@@ -254,6 +258,8 @@ def _plate_rows(summary: ProblemSummary) -> Iterator[Row]:
         radii = [f"{name} {in_units(1.0 / k, 'length')}" for name, k in named if k]
         rise = f"rise {in_units(summary.rise, 'length')}"
         yield ("curved panel", ", ".join([*radii, rise]))
+    if summary.supports is not None:
+        yield from support_rows(summary.supports, summary.units)
     if summary.cure is not None:
         yield ("cure", f"{summary.cure:+g} K")
     if summary.threshold is not None:
@@ -283,7 +289,8 @@ def _impact_rows(summary: ProblemSummary) -> Iterator[Row]:
 def _program_rows(summary: ProblemSummary) -> Iterator[Row]:
     """Yield rows about time steps, resolution of the mesh, and size of the result."""
     critical = summary.critical_time_step
-    yield ("critical time step", _quantity(summary, critical, "time"))
+    of_plate = _share_of_step(summary)
+    yield ("critical time step", f"{_quantity(summary, critical, 'time')}{of_plate}")
     if summary.buckling_factor is not None:
         far = math.isinf(summary.buckling_factor)
         times = f"more than {FAR:g}" if far else significant(summary.buckling_factor)
@@ -304,6 +311,14 @@ def _program_rows(summary: ProblemSummary) -> Iterator[Row]:
     at_most = "at most " if summary.at_most else ""
     yield ("impact steps", f"{at_most}{summary.steps}")
     yield ("output", f"{at_most}{format_bytes(summary.output_bytes)}")
+
+
+def _share_of_step(summary: ProblemSummary) -> str:
+    """Return, in brackets, the share of the critical time step that springs leave."""
+    supports = summary.supports
+    if supports is None or not (supports["springs"] or supports["one_sided"]):
+        return ""
+    return f" ({supports['step_ratio']:.1%} of the plate's without springs)"
 
 
 def _effect_of_equilibrium(summary: ProblemSummary) -> str:
@@ -364,6 +379,7 @@ def deck_summary(problem: Problem) -> ProblemSummary:
         delaminations=0 if problem.threshold is None else problem.threshold.number,
         symmetry_factor=problem.symmetry.factor,
         symmetry_lines=problem.symmetry.places,
+        supports=supports_summary(problem),
     )
 
 

@@ -10,11 +10,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from fecm._typing import Bools, Floats
 from fecm.deck.catalogue import material_names
 from fecm.deck.material_cards import Layer
 from fecm.deck.units import mass_in_si, quantity, unit_names, unit_of
 from fecm.plot import data, style
-from fecm.plot.mesh import MARKS, Support, draw_plate, support_masks
+from fecm.plot.mesh import MARKS, MASS, Support, draw_plate, masses, support_masks
 from fecm.plot.plate import aspect
 from fecm.problem.parts import rod_of_deck
 from fecm.problem.problem import Problem
@@ -68,17 +69,31 @@ def arrangement(name: str, result: Result, problem: Problem, hits: Impactor) -> 
 
 
 def _section(axes: Axes, name: str, result: Result, problem: Problem, hits: Impactor) -> None:
-    """Draw the section along x through the impact point, to scale, and the projectile."""
+    """Draw the section along x through the impact point, to scale, and the projectile.
+
+    Clamps and point masses behind it are drawn as well.
+    """
     coordinates = result["mesh/coordinates"]
     (x0, y0) = data.impact_point(result, name)
     ends = coordinates[:, 0].min(), coordinates[:, 0].max()
     wide, h = float(ends[1] - ends[0]), problem.laminate.thickness
     axes.add_patch(Rectangle((ends[0], 0.0), wide, -h, fc="0.6", ec="0.2", lw=0.5))
     level = np.abs(coordinates[:, 1] - y0)
-    for support in (Support.CLAMPED, Support.W_HELD):
-        held = support_masks(result)[support] & (level <= level.min() + 1e-6 * wide)
-        x = coordinates[held, 0]
-        axes.plot(x, np.full(len(x), -h - 0.03 * wide), ls="none", clip_on=False, **MARKS[support])
+    on_section = level <= level.min() + 1e-6 * wide
+    struck = np.zeros_like(on_section)  # nodes with a one-sided support on the struck face
+    if (supports := problem.moving_plate.supports) is not None:
+        struck[supports.node[supports.side < 0.0]] = True
+    tips = problem.rests & ~problem.knife_edges  # of clamps, seen behind the section
+    masks = support_masks(result)
+    above, below = 0.03 * wide, -h - 0.03 * wide
+    for support in (Support.CLAMPED, Support.W_HELD, Support.SPRING, Support.ONE_SIDED):
+        look = MARKS[support] | {"ls": "none", "clip_on": False}
+        at_section = masks[support] & on_section & ~tips
+        axes.plot(*_row(coordinates, at_section & ~struck, below), **look)
+        axes.plot(
+            *_row(coordinates, (at_section & struck) | (masks[support] & tips), above), **look
+        )
+    axes.plot(*_row(coordinates, masses(result, name), above), clip_on=False, **MASS)
     top, names = 0.2 * wide, unit_names(problem.deck)
     rod = rod_of_deck(problem.deck)
     if rod is not None and hits.name == rod.kind:
@@ -95,6 +110,12 @@ def _section(axes: Axes, name: str, result: Result, problem: Problem, hits: Impa
     axes.text(x0, 0.7 * top, f"   {words}", va="center", fontsize=LARGEST_LABEL)
     axes.set(ylim=(-h - 0.06 * wide, 1.05 * top), aspect="equal", yticks=[])
     axes.spines["left"].set_visible(False)
+
+
+def _row(coordinates: Floats, nodes: Bools, height: float) -> tuple[Floats, Floats]:
+    """Return x of nodes of a mask, (n,), and a height for each."""
+    x = coordinates[nodes, 0]
+    return x, np.full(len(x), height)
 
 
 def draw_stack(

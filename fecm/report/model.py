@@ -26,6 +26,7 @@ from fecm.deck.units import (
 )
 from fecm.problem.problem import Problem
 from fecm.problem.summary import rise_of
+from fecm.problem.support_summary import support_rows, supports_summary
 from fecm.report.content import (
     PageBlock,
     PagePicture,
@@ -70,7 +71,7 @@ def of_problem(result: Result, problem: Problem) -> Iterator[PageBlock]:
 
 def _plate(result: Result, problem: Problem) -> Iterator[Row]:
     """Yield rows about the plate, its mesh, supports and loads."""
-    from fecm.plot.mesh import support_masks
+    from fecm.plot.mesh import RESTRAINTS, support_masks
 
     deck, plate = problem.deck, problem.plate
     in_units = partial(_in_units, deck)
@@ -81,9 +82,12 @@ def _plate(result: Result, problem: Problem) -> Iterator[Row]:
     control = deck.control
     yield "mesh", f"{control.numel} elements of up to {control.nen} nodes, {control.numnp} nodes"
     if "mesh/equations" in result:
-        held = {str(name): int(nodes.sum()) for name, nodes in support_masks(result).items()}
-        texts = [f"{count} nodes {name}" for name, count in held.items() if count]
-        yield "supports", ", ".join(texts) or "none: the plate is free"
+        held = {kind: int(nodes.sum()) for kind, nodes in support_masks(result).items()}
+        texts = [f"{held[kind]} nodes {kind}" for kind in RESTRAINTS if held[kind]]
+        if texts or plate.supports is None:
+            yield "supports", ", ".join(texts) or "none: the plate is free"
+    if (supports := supports_summary(problem)) is not None:
+        yield from support_rows(supports, unit_names(deck))
     for axis, radius in radii_of(result).items():
         yield f"radius R{axis}", in_units(radius, "length")
     if "mesh/z" in result:

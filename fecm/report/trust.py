@@ -15,6 +15,7 @@ from fecm.judge.end import ENDS, OPEN_PEAKS
 from fecm.judge.exposures import FINER_MESHES_DECIDE, FailureVerdict, failure_verdict
 from fecm.judge.limits import (
     BALANCED,
+    CLAMPS_PULL,
     ELEMENTS_PER_WAVE,
     ENERGY_BALANCE,
     EXPOSURE,
@@ -22,6 +23,7 @@ from fecm.judge.limits import (
     INDENTATION,
     ITERATION,
     POINT_FORCE,
+    PULL,
     SHEAR_FACTOR,
     SLOPE,
     STRAIN,
@@ -32,7 +34,7 @@ from fecm.judge.limits import (
 )
 from fecm.judge.validity import CURVED, of_face, reasons_of
 from fecm.listing.slips import LISTING
-from fecm.problem.estimates import format_mesh_error
+from fecm.problem.estimates import format_mesh_error, pull_of_edges
 from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
 from fecm.problem.summary import deck_summary
@@ -40,8 +42,8 @@ from fecm.report.content import UNKNOWN, number_with_unit, share
 from fecm.results.exposures import evaluations_in_contact, largest_exposures
 from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
-from fecm.results.run_metrics import impact_energy
-from fecm.results.summary import threshold_verdict
+from fecm.results.run_metrics import impact_energy, peak_and_deflection
+from fecm.results.summary import largest_of_supports, threshold_verdict
 
 SLOPES = "membrane/largest_slope"  # of a nonlinear plate, at the stored rows
 
@@ -80,6 +82,7 @@ def judgements(result: Result, problem: Problem | None) -> Iterator[Judgement]:
     yield from _failure(result)
     yield from _threshold(result)
     if problem is not None:
+        yield from _supports(result, problem)
         yield from _mesh(problem)
     yield from _numerical(result)
     yield from _mode(result)
@@ -163,6 +166,20 @@ def _threshold(result: Result) -> Iterator[Judgement]:
         beyond=crossed or result.end in OPEN_PEAKS,
         words="; ".join([threshold_verdict(result), *([THRESHOLD.page] if crossed else [])]),
     )
+
+
+def _supports(result: Result, problem: Problem) -> Iterator[Judgement]:
+    """Judge the pull of supports that can only push, or of clamps."""
+    if "history/force" not in result:
+        return
+    peak, deflection = peak_and_deflection(result)
+    if pull := pull_of_edges(problem, peak, deflection):
+        yield PULL.judgement(share(pull), beyond=pull > PULL.value)
+    elif peak and (largest := largest_of_supports(result)):
+        ratio = largest["pull"] / (result.symmetry_factor * peak)
+        beyond = ratio > CLAMPS_PULL.value and bool(problem.rests.any())
+        words = "" if ratio else "the supports only push"
+        yield CLAMPS_PULL.judgement(share(ratio), beyond=beyond, words=words or None)
 
 
 def _mesh(problem: Problem) -> Iterator[Judgement]:

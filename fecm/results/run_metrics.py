@@ -125,6 +125,19 @@ def start_w_of(stored: Stored) -> float:
     return _number(stored.attributes_of("history").get(START_W, 0.0))
 
 
+def peak_and_deflection(stored: Stored) -> tuple[float, float]:
+    """Return the peak force, and the deflection by the impact at that time, of the part of a deck.
+
+    Returns zeros without a contact force.
+    """
+    force = stored["history/force"]
+    if not force.any():
+        return 0.0, 0.0
+    peak = int(force.argmax())
+    deflection = stored["history/plate_w"][peak] - start_w_of(stored)
+    return float(force[peak]), float(deflection)
+
+
 def impact_energy(stored: Stored) -> float:
     """Return the energy of the impact on the whole plate, without energy of a static load."""
     return stored.symmetry_factor * _energy_of_part(stored)

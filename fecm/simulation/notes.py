@@ -40,15 +40,14 @@ from fecm.judge.validity import joined, of_face, unsafe
 from fecm.mechanics.mesh import rigid_deflections
 from fecm.mechanics.points import shortest_side
 from fecm.mechanics.quick_models import static_energy, static_peak
-from fecm.mechanics.solutions import pull_of_supports
 from fecm.problem.contact_estimates import mean_pressure
-from fecm.problem.estimates import MOST_SOLVED, pushing_compliance
+from fecm.problem.estimates import pull_of_edges, pushing_compliance
 from fecm.problem.problem import Problem
 from fecm.results.exposures import count_evaluations, largest_exposures
 from fecm.results.metrics import MOBILITY
 from fecm.results.onset import energy_at_force
 from fecm.results.result import Result
-from fecm.results.run_metrics import start_w_of, steps_to_decide
+from fecm.results.run_metrics import peak_and_deflection, start_w_of, steps_to_decide
 from fecm.results.stored import row_blocks
 from fecm.simulation.simulation import Simulation
 
@@ -261,8 +260,6 @@ def _delamination(simulation: Simulation, result: Result) -> Iterator[str]:
         )
 
 
-# Share of the static deflection at the peak force from which on the supports carry the force.
-STATIC = 0.5
 STANDARD_GRAVITY = 9.80665  # m/s^2
 
 
@@ -340,23 +337,12 @@ def _late_values(result: Result, end: End) -> Iterator[str]:
 
 
 def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
-    """Yield a note if supports pull that can only push.
-
-    The pull is computed for a static load. A light projectile is gone before its wave reaches the
-    supports, so the note requires that the deflection at the peak is near the static deflection.
-    """
+    """Yield a note if supports pull that can only push. The pull is computed for a static load."""
     problem = simulation.problem
-    contact, force = problem.contact, result["history/force"]
-    if contact is None or not force.any() or problem.deck.control.numel > MOST_SOLVED:
-        return
-    if not problem.knife_edges.any() or (response := problem.static) is None:
-        return
-    forces = pull_of_supports(problem.moving_plate, response, contact)
-    pull = float(forces[problem.knife_edges].sum())
-    peak = int(force.argmax())
-    w = result["history/plate_w"][peak] - start_w_of(result)
-    if pull > PULL.value and w > STATIC * force[peak] * response.compliance:
-        band = _band_without_pull(problem, result, response.compliance)
+    pull = pull_of_edges(problem, *peak_and_deflection(result))
+    if pull > PULL.value:
+        assert problem.static is not None  # it has the pull
+        band = _band_without_pull(problem, result, problem.static.compliance)
         yield PULL.say(pull=pull, band=band, remedy=simulation.model.variant.is_report)
 
 

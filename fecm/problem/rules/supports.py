@@ -10,15 +10,27 @@ import numpy as np
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, declare, rule
 from fecm.mechanics.interpolation import W
-from fecm.mechanics.solutions import ConvergenceError, StaticResponse
+from fecm.mechanics.solutions import (
+    ConvergenceError,
+    SingularStiffnessError,
+    StaticResponse,
+    static_response,
+)
 from fecm.mechanics.time_step import safe_time_step
 from fecm.problem.estimates import MOST_SOLVED
 from fecm.problem.generate import node_values
 from fecm.problem.problem import Problem
-from fecm.problem.supports import NoLineError, line_weights, one_sided_rows
+from fecm.problem.supports import (
+    NoLineError,
+    default_stiffness,
+    line_weights,
+    one_sided_rows,
+)
 
 LARGEST_GAP = 0.5  # of the thickness, beyond which a gap is doubted
 LARGEST_GAIN = 0.005  # of flexibility by the stiffness of the supports
+STEP_BEYOND = 1.02  # factor on the stiffness that would leave it if the reactions stayed the same
+MOST_STIFFENED = 5  # static solutions for that stiffness; one or two are usual
 LARGEST_SHARE = 1.0  # of the stiffness 4 m/dt^2 that the time step allows the plate alone
 
 declare(
@@ -193,8 +205,50 @@ def soft_supports(problem: Problem) -> Reports:
         return
     if (gain := response.gain) > LARGEST_GAIN:
         message = f"The supports are soft: they make the plate {gain:.2%} more flexible."
-        hint = f"{gain / LARGEST_GAIN:.3g} times the stiffness leaves {LARGEST_GAIN:.1%}"
-        yield Report(message, problem.deck.require(model.OneSidedSupports).place(), hint)
+        segment = problem.deck.require(model.OneSidedSupports)
+        per_length = " per length" if segment.is_of_lines else ""
+        hint = "give them a larger stiffness"
+        if (factor := _stiffer(problem, gain)) is not None:
+            enough = factor * _card_stiffness(problem, segment)
+            hint = f"a stiffness of {enough:.3g}{per_length} leaves {LARGEST_GAIN:.1%}"
+        yield Report(message, segment.place(), hint)
+
+
+def _stiffer(problem: Problem, gain: float) -> float | None:
+    """Return the factor on the stiffness of one-sided supports that leaves LARGEST_GAIN.
+
+    Returns None where none does: under a load on a support, which bends the plate little.
+    """
+    plate, contact, factor = problem.moving_plate, problem.contact, 1.0
+    assert plate.supports is not None
+    assert contact is not None
+    supports = plate.supports
+    for _ in range(MOST_STIFFENED):
+        if gain >= 1.0:
+            break
+        factor *= STEP_BEYOND * gain / (1.0 - gain) / LARGEST_GAIN
+        stiffness = np.where(supports.is_one_sided, factor, 1.0) * supports.stiffness
+        stiffer = replace(plate, supports=replace(supports, stiffness=stiffness))
+        try:
+            gain = static_response(stiffer, contact).gain
+        except (ConvergenceError, SingularStiffnessError):
+            break
+        if gain <= LARGEST_GAIN:
+            return factor
+    return None
+
+
+def _card_stiffness(problem: Problem, segment: model.OneSidedSupports) -> float:
+    """Return the stiffness of the first card of UNIL; the default one of a blank."""
+    card = segment.records[0]
+    if card.stiffness:
+        return card.stiffness
+    plate = replace(problem.moving_plate, supports=None)
+    default = default_stiffness(plate, safe_time_step(plate))
+    if not segment.is_of_lines:
+        return float(default[card.node - 1])
+    nodes, weights = line_weights(problem.mesh, card.node, card.increment)
+    return float(np.median(default[nodes] / weights))
 
 
 @rule("E579", Subject.MESH)
