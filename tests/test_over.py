@@ -51,6 +51,14 @@ def test_a_loop_ends_at_the_first_tested_pass_at_which_the_impact_is_over() -> N
     assert np.abs(run.force - whole.force[:steps]).max() < 1e-9 * whole.force.max()
 
 
+def test_a_sweep_decides_cases_that_a_run_decides() -> None:
+    deck = until_over(passes=8000)  # in contact after a quarter of them
+    run, cases = fecm.run_one(deck), fecm.sweep(deck, {"velocity": [115.0]})
+    assert list(cases["status"]) == ["ok"]
+    for name in ("peak_force", "contact_time", "rebound_velocity"):
+        assert cases[name] == pytest.approx([run.metrics[name]], rel=1e-6)
+
+
 def steps_of(path: Path) -> int:
     """Number of steps of a stored run."""
     return len(fecm.load(path).force)

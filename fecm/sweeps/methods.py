@@ -13,6 +13,7 @@ from abc import abstractmethod
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -362,14 +363,23 @@ def _levels(settings: Settings, problem: Problem, impacts: Impacts) -> Floats:
 def _lengthened(
     outcome: Outcome, backend: Backend, impacts: Impacts, settings: Settings
 ) -> Outcome:
-    """Repeat impacts that end between contacts, or may touch again, with a longer response."""
-    no_contact = outcome.columns[About.STATUS] == Status.OK
-    candidates = np.array(outcome.numbers)[no_contact]
-    for factor in backend.durations[1:]:
-        is_open = np.isin(outcome.numbers, candidates) & np.isnan(outcome.columns[PEAK_FORCE])
+    """Repeat open impacts with a longer response.
+
+    Up to the duration of the program these are all that are not over; beyond it those that were
+    between contacts at its end, or may touch again.
+    """
+    candidates = np.array(outcome.numbers)
+    for before, factor in pairwise(backend.durations):
+        status, numbers = outcome.columns[About.STATUS], np.array(outcome.numbers)
+        is_open = np.isnan(outcome.columns[PEAK_FORCE])
+        if factor <= 1:
+            is_open = (is_open & (status == Status.OK)) | (status == Status.STILL)
+        else:
+            candidates = numbers[status == Status.OK] if before == 1 else candidates
+            is_open &= np.isin(numbers, candidates)
         if not is_open.any():
             break
-        again = np.flatnonzero(np.isin(impacts.numbers, np.array(outcome.numbers)[is_open]))
+        again = np.flatnonzero(np.isin(impacts.numbers, numbers[is_open]))
         longer = backend.lengthened(factor).outcomes(impacts.select(again))
         parts = [outcome.select(np.flatnonzero(~is_open)), longer]
         outcome = merge(parts, history=settings.history)
