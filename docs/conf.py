@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+from collections.abc import Iterator
 from importlib.metadata import version as installed
 from pathlib import Path
 from textwrap import wrap
@@ -13,6 +14,8 @@ from typing import Any
 from latex2mathml.converter import convert
 
 WIDTH = 64  # of notes above tables: what fits between both side bars
+# Pages to look up, and the level of the headings below which all but a first sentence is folded.
+FOLDED = {"verification": 2, "findings": 2, "datasets": 2, "commands": 2, "changelog": 3}
 
 project = "fecm"
 author = "the fecm developers"
@@ -77,6 +80,7 @@ html_theme_options = {
 }
 html_sidebars = {page: [] for page in ("install", "tutorial", "changelog")}  # no pages below them
 html_show_sourcelink = False
+html_split_index = True  # a page for each letter
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_math_renderer = "mathml"
@@ -138,6 +142,44 @@ def _wrap_output(app: Any, doctree: Any) -> None:
         block += nodes.Text(block.rawsource)
 
 
+def _folds(app: Any, doctree: Any) -> None:
+    """Fold tables, options and parameters; browsers open what a link names."""
+    from docutils import nodes
+    from sphinx import addnodes
+
+    for section in doctree.findall(nodes.section):
+        depth = sum(isinstance(part, nodes.section) for part in _ancestors(section))
+        if depth + 1 >= FOLDED.get(app.env.docname, 9):
+            _fold(section)
+    for described in doctree.findall(addnodes.desc):
+        outer = any(isinstance(part, addnodes.desc) for part in _ancestors(described))
+        if described["domain"] == "py" and not outer:
+            _fold(described[-1])
+
+
+def _ancestors(node: Any) -> Iterator[Any]:
+    """Go from a node to the root."""
+    while node := node.parent:
+        yield node
+
+
+def _fold(node: Any) -> None:
+    """Fold a node's children but its title, first paragraph, and sections."""
+    from docutils import nodes
+    from sphinx import addnodes
+
+    heads = nodes.title, nodes.paragraph, addnodes.index, nodes.target
+    first = next((n for n, part in enumerate(node) if not isinstance(part, heads)), len(node))
+    last = next((n for n, part in enumerate(node) if isinstance(part, nodes.section)), len(node))
+    if first >= last:
+        return
+    rows = sum(len(body) for part in node[first:last] for body in part.findall(nodes.tbody))
+    label = f"{rows} rows" if rows > 1 else "1 row" if rows else "Details"
+    opening = f'<details class="fold"><summary>{label}</summary>'
+    folded = [*node[first:last], nodes.raw("", "</details>", format="html")]
+    node[first:last] = [nodes.raw("", opening, format="html"), *folded]
+
+
 def _literally(app: Any, context: Any, lines: list[str]) -> None:
     """Keep bars, stars and addresses in help texts from being markup."""
     lines[:] = [re.sub(r"[|*]|(?<=:)//", r"\\\g<0>", line) for line in lines]
@@ -146,6 +188,7 @@ def _literally(app: Any, context: Any, lines: list[str]) -> None:
 def setup(app: Any) -> None:
     """Register the renderer of equations, and correct help texts."""
     app.connect("doctree-read", _wrap_output)
+    app.connect("doctree-read", _folds)
     for part in ("description", "options"):
         app.connect(f"sphinx-click-process-{part}", _literally)
     app.connect("doctree-read", _captions)

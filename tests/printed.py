@@ -50,6 +50,12 @@ class Printed(NamedTuple):
     printed: list[str]
 
 
+def text_of(pattern: str) -> str:
+    """Text of the pages of docs/ whose names match, such as ``api*.md``."""
+    pages = sorted((ROOT / "docs").glob(pattern))
+    return "".join(page.read_text(encoding="utf-8") for page in pages)
+
+
 def outputs(page: Path, folder: Path) -> Iterator[Printed]:
     """Run the blocks of a page in a folder, and yield the outputs that it shows.
 

@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import Any
 
 import fecm
-from tests.decks import ROOT
+from tests.printed import text_of
 
 DIRECTIVE = re.compile(r"^\.\. auto(?!module)\w+:: (\S+)\n((?:   :.*\n)*)", re.MULTILINE)
 # Parts of the program that objects hold: nobody who uses them makes or reads one.
@@ -88,7 +88,7 @@ def lacking(page: str) -> dict[str, str]:
     return {name: where for name, where in by_name.items() if name not in HELD}
 
 
-PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+PAGE = text_of("api*.md")
 
 
 def test_every_type_of_a_public_signature_is_on_the_page_of_the_api() -> None:

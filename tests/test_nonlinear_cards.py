@@ -304,7 +304,7 @@ def test_check_names_kinematics_and_preload_in_one_line_each(tmp_path: Path) -> 
 
 
 def test_displaced_edges_before_an_impact_are_the_preload_of_their_strain() -> None:
-    page = (ROOT / "docs" / "making.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "stretching.md").read_text(encoding="utf-8")
     (recipe,) = re.findall(r"```\n(FORC\n.*?END\n)```", page, re.DOTALL)
     displaced, newton = recipe.split("...\nMACR\n")
     newton = newton[: newton.index("LMAS")]

@@ -26,6 +26,7 @@ from fecm import ContactPoint
 from fecm.deck.reader import HDF5
 from tests.calls import call
 from tests.decks import APPENDIX, DATA_CARDS, DISC, LONG, PLY_PROGRAM, PROGRAM, ROOT, small
+from tests.printed import text_of
 
 # The small plate with ply stresses and exposures.
 STRENGTHS = "ALLO\n   200000.   200000.     7000.    28000.    13000.\n\n"
@@ -68,7 +69,7 @@ def test_each_public_name_is_what_a_type_checker_takes_it_for() -> None:
 
 
 def test_the_page_of_the_api_has_every_public_name() -> None:
-    page = (ROOT / "docs" / "api.md").read_text()
+    page = text_of("api*.md")
     listed = re.findall(r"^\.\. auto\w+:: fecm\.(\w+)$", page, re.MULTILINE)
     assert sorted(listed) == sorted(set(fecm.__all__) - {"__version__"})
 

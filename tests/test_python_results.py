@@ -23,6 +23,7 @@ import fecm
 from fecm.results.metrics import METRICS, MetricAttributes
 from fecm.sweeps.execute import SchedulerError
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, ROOT, small
+from tests.printed import text_of
 
 UNITS = "UNIT\nin lbf s\n"
 DECK = small(data=UNITS + DATA_CARDS)
@@ -53,7 +54,7 @@ def test_results_are_compared_and_looked_for_in_lists(kind: str) -> None:
 
 
 def test_classes_of_the_api_that_hold_arrays_are_equal_only_to_themselves() -> None:
-    page = (ROOT / "docs" / "api.md").read_text("utf-8")
+    page = text_of("api*.md")
     held = 0
     for name in re.findall(r"autoclass:: (\S+)", page):
         module, _, attribute = name.rpartition(".")

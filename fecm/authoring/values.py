@@ -161,7 +161,7 @@ PLATE_VALUES: tuple[SweepValue[PlateSetter], ...] = (
     SweepValue("g23", Changes.LAMINATE, _STRESS, plate.ply_property("g23"),
              meaning="transverse shear modulus across the fibres"),
     SweepValue("layup", Changes.LAMINATE, "", plate.set_layup, ValueKind.TEXT,
-             meaning="[layup](making.md#layups), with the ply thickness of the deck"),
+             meaning="[layup](layups.md#layups), with the ply thickness of the deck"),
     SweepValue("layer_materials", Changes.LAMINATE, "", plate.set_layer_materials, ValueKind.TEXT,
              meaning="numbers of the materials of the layers, written as a layup's angles: "
                      "`[1/2]s`; `layup` keeps each layer's"),

@@ -103,7 +103,7 @@ declare(
     "XML, JSON, STEP and IGES, are known by their beginning.",
     remedy=(
         "`fecm new --mesh FILE` takes a mesh; the hint says how to export one. FEAP: "
-        "[what to change](deck.md#decks-of-feap)."
+        "[what to change](other-files.md#decks-of-feap)."
     ),
 )
 
@@ -225,7 +225,7 @@ declare(
     "E505",
     Subject.PROGRAM,
     "The number of a macro is out of range.",
-    remedy="See [macros](deck.md#macro-program).",
+    remedy="See [macros](macros.md).",
 )
 declare(
     "E506",

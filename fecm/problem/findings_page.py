@@ -20,7 +20,7 @@ HEAD = """\
 
 `fecm check` and `fecm run` report what is wrong or doubtful in a deck as findings: `E` is an error, which a
 run refuses, `W` a warning, `N` a note. Codes are stable. A finding names file, line and column, shows the card
-with the field marked, and has a hint where there is a remedy. [Checking a deck](making.md#checking) says more.
+with the field marked, and has a hint where there is a remedy. [Checking a deck](checking.md) says more.
 """  # noqa: E501
 TABLE = ["| code | finding | remedy |", "|---|---|---|"]
 

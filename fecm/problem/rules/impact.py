@@ -150,7 +150,7 @@ def doubtful_velocity(problem: Problem) -> Reports:
 def coarse_mesh(problem: Problem) -> Reports:
     """There are too few elements per bending wave at the impact node.
 
-    Remedy: A finer mesh there: see [checking a deck](making.md#checking).
+    Remedy: A finer mesh there: see [checking a deck](checking.md).
     """
     waves = resolution(problem)
     if waves is None or waves.elements >= ELEMENTS_PER_WAVE.value:

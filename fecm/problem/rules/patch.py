@@ -134,7 +134,7 @@ def unresolved_patch(problem: Problem) -> Reports:
     force is too high.
 
     Remedy: A finer mesh at the patch (`fecm new --grading`); `fecm check --mesh-error`: see
-    [checking a deck](making.md#checking).
+    [checking a deck](checking.md).
     """
     card, patch = problem.deck.require(model.Patch), problem.patch
     if patch is None:
