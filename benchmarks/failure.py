@@ -2,9 +2,9 @@
 
     python benchmarks/failure.py [--rounds N] [--write]
 
-The decks are the report's with the strengths of its ply, and the example drop-weight.inp, a test of
-ASTM D7136.  Runs are those of ``fecm.run``, in memory; the figures are processor times, the least
-of some rounds.  Pin it to one core: ``taskset -c 0 python benchmarks/failure.py``.
+The decks are the report's with the strengths of its ply, and the example drop-weight-held.inp, a
+test of ASTM D7136.  Runs are those of ``fecm.run``, in memory; the figures are processor times, the
+least of some rounds.  Pin it to one core: ``taskset -c 0 python benchmarks/failure.py``.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def report() -> str:
 
 def drop_weight() -> str:
     """Return the drop-weight test of the examples."""
-    return (HERE / "fecm" / "examples" / "drop-weight.inp").read_text()
+    return (HERE / "fecm" / "examples" / "drop-weight-held.inp").read_text()
 
 
 CASES = {"impact-115": report, "drop-weight": drop_weight}

@@ -7,7 +7,7 @@ threshold. The plate is stepped once for all energies.
 
 import fecm
 
-deck = fecm.read_one(fecm.examples.path("drop-weight.inp"))
+deck = fecm.read_one(fecm.examples.path("drop-weight-held.inp"))
 energies = [500.0 * n for n in range(1, 21)]  # mJ
 result = fecm.sweep(deck, {"energy": energies, "duration": [0.005]})
 

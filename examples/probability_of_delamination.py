@@ -7,7 +7,7 @@ exceeds a value, and that it exceeds the delamination threshold, from 512 impact
 
 import fecm
 
-deck = fecm.read_one(fecm.examples.path("drop-weight.inp")).with_(energy="4.3J")
+deck = fecm.read_one(fecm.examples.path("drop-weight-held.inp")).with_(energy="4.3J")
 laws = {"energy": "normal:4300,200", "k": "lognormal:42000,0.2"}  # mJ, N/mm^1.5
 result = fecm.sweep(deck, random=laws, samples=512, exceed={"peak_force": "threshold"})
 chance = result.random.exceedance

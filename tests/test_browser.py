@@ -107,7 +107,9 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     replay = fecm.run_one(fecm.examples.path("impact-patch.inp"))
     html = render(page_of({"replay": replay}, options=PageOptions(measured=measured)))
     (folder / "measured.html").write_text(html, encoding="utf-8", newline="\n")
-    drop_weight, tests = (fecm.examples.path(name) for name in ("drop-weight.inp", "tests.csv"))
+    drop_weight, tests = (
+        fecm.examples.path(name) for name in ("drop-weight-held.inp", "tests.csv")
+    )
     results = {
         "run": {"run": run},
         "tests": {"tests": fecm.sweep(drop_weight, cases=tests)},

@@ -15,7 +15,7 @@ from tests.calls import assert_unusable, call
 
 DECKS = [name for name in examples.names() if name.endswith(".inp")]
 NOTES = {
-    "drop-weight.inp": ("the supports pull the plate",),
+    "drop-weight-held.inp": ("the supports pull the plate",),
     "panel-with-gages.inp": ("the run ends without contact, but the projectile leaves so slowly",),
 }
 

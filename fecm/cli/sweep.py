@@ -78,8 +78,8 @@ def _texts(form: str, values: Iterable[str] = (), forms: Sequence[str] = ()) -> 
     groups=groups_of(Sweep, GROUPS),
     epilog=typical(
         "fecm sweep impact-patch.inp --vary velocity=50:150:11 --vary k=1e6,2e6",
-        "fecm sweep drop-weight.inp --find velocity --until peak_force=threshold",
-        "fecm sweep drop-weight.inp --random k=lognormal:42000,.2 --samples 200 "
+        "fecm sweep drop-weight-held.inp --find velocity --until peak_force=threshold",
+        "fecm sweep drop-weight-held.inp --random k=lognormal:42000,.2 --samples 200 "
         "--exceed peak_force=threshold",
     ),
 )

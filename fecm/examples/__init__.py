@@ -12,6 +12,7 @@ __all__ = ["names", "path"]
 CONTENTS = {
     "impact-patch.inp": "the report's experiment at 115 in/s, with a contact patch (lbf, in, s)",
     "drop-weight.inp": "ASTM D7136 at 2.5 J, with strengths and delamination threshold (mm, N, s)",
+    "drop-weight-held.inp": "the same, w held along the window: linear, for sweeps and fits",
     "plate-with-gages.inp": "a ball of 20 g on a clamped plate with strain gages (mm, N, s)",
     "panel-with-gages.inp": "a panel with four strain gages, to locate an impact (mm, N, s)",
     "panel-strains.csv": "strains of an impact somewhere on that panel: time, gages 1 to 4",
@@ -21,7 +22,7 @@ CONTENTS = {
     "calibration-test.csv": "a calibration of a transducer: time, V_F, V_a",
     "pulse.csv": "a force on a rod: time, force",
     "cases.csv": "cases of a sweep of impact-patch: velocity, k, layup",
-    "tests.csv": "tests of drop-weight: specimen, energy, measured peak force and contact time",
+    "tests.csv": "tests of drop-weight-held: specimen, energy, measured peak and contact time",
 }
 
 
