@@ -8,6 +8,7 @@ D7136, 125 x 75 in a plate of 150 x 100; the third has springs along all edges.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -20,6 +21,8 @@ import fecm
 from fecm import Result
 from fecm._table import ShownNumber
 from fecm.deck import model
+from fecm.deck.macros import Macro
+from fecm.deck.mesh_cards import NodeCodes
 from fecm.deck.model import (
     Deck,
     NodeValues,
@@ -29,18 +32,28 @@ from fecm.deck.model import (
     Springs,
 )
 from fecm.judge.limits import Judgement, TrustLevel
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.solutions import modes, static_response
 from fecm.mechanics.stiffness_product import internal_force_operator
 from fecm.mechanics.supports import NodeSupports
-from fecm.mechanics.symmetry import symmetry_reduction, unreduced, with_codes
+from fecm.mechanics.symmetry import (
+    SymmetryReduction,
+    symmetry_reduction,
+    unreduced,
+    with_codes,
+)
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.plot.mesh import Support, support_masks
+from fecm.problem import build
 from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
 from fecm.problem.summary import deck_summary
 from fecm.report.trust import deck_problem, judgements
 from fecm.results.summary import about_run, run_summary
 from tests.builders import Floats, table
+from tests.calls import call
+from tests.stopped_runs import StoppedError
+from tests.stopped_runs import run as run_stopped
 
 SIZE = 150.0, 100.0
 STATIC_PLY = fecm.Ply(1.57e-9, 0.32, 161000.0, 11380.0, 5170.0, 5170.0, 3980.0)
@@ -230,8 +243,21 @@ def test_the_kernels_take_the_steps_of_numpy(solver: str) -> None:
     assert np.abs(first["energy/balance_error"]).max() < 1e-6 * first.energy.attributes["initial"]
 
 
-def test_any_number_of_threads_and_a_resumed_run_have_the_same_bytes(tmp_path: Path) -> None:
-    deck = with_segments(free_plate(duration=1e-4), pushing(gap=1e-3))
+def test_the_stored_energy_is_that_of_every_support_at_the_stored_displacement() -> None:
+    gap = 1e-3
+    deck = free_plate((12, 8), duration=2e-4)
+    result = run(with_segments(deck, pushing((12, 8), 1e4, gap), pulling_too((12, 8), 20.0)))
+    side, k = result["supports/side"], result["supports/stiffness"]
+    w = result["tape3/displacement"][:, result["supports/node"] - 1, result["supports/dof"] - 1]
+    energy = 0.5 * k * np.where(side == 0, w, np.maximum(side * w - gap, 0.0)) ** 2
+    assert energy[:, side != 0].max() > 0.0
+    assert result["supports/energy"] == pytest.approx(energy.sum(axis=1), rel=1e-9)
+    at_rows = np.searchsorted(result["energy/time"], result["supports/time"])
+    assert (result["supports/energy"] <= result["energy/plate_strain"][at_rows]).all()
+
+
+def test_any_number_of_threads_gives_the_same_bytes(tmp_path: Path) -> None:
+    deck = with_segments(free_plate(duration=4e-5), pushing(gap=1e-4))
     names = [tmp_path / f"{n}.h5" for n in ("one", "two")]
     for threads, name in enumerate(names, start=1):
         fecm.run(deck, output=name, threads=threads)
@@ -527,3 +553,130 @@ def test_an_edge_that_springs_hold_against_rotation_may_pull() -> None:
     assert edge.level is TrustLevel.WITHIN
     assert isinstance(edge.size, ShownNumber)
     assert edge.size.value > 0.1
+
+
+# Statics and modes -------------------------------------------------------------------------------
+
+SOLVED = ("LOOP 50", "TANG", "FORM", "SOLV", "CONV", "NEXT", "DISP")
+MIDDLE = 213  # node in the middle of 12 x 8 elements
+OF_IMPACT = (model.Impact, model.Projectile, model.Indentation, model.Patch)
+
+
+def loaded_deck(words: Sequence[str], forces: model.Forces, *supports: model.Segment) -> Deck:
+    """The plate of 12 x 8 elements under forces, with supports and a program."""
+    deck = free_plate((12, 8))
+    kept = [segment for segment in deck.segments if not isinstance(segment, OF_IMPACT)]
+    macros = [Macro(word[:4], value=float(word[4:] or 0)) for word in words]
+    return replace(deck, segments=(*kept, forces, *supports), macros=tuple(macros), text="")
+
+
+def pressed(force: float, *nodes: int) -> model.Forces:
+    """A force on w of each node."""
+    return model.Forces(tuple(NodeValues(n, 0, (0.0, 0.0, force, 0.0, 0.0)) for n in nodes))
+
+
+def deflections(forces: model.Forces, *supports: model.Segment) -> Floats:
+    """W of the static plate."""
+    w = run(loaded_deck(SOLVED, forces, *supports))["tape3/w"]
+    return np.asarray(w[-1])
+
+
+def test_a_static_deck_on_stiff_springs_is_the_one_on_restraints() -> None:
+    force = pressed(100.0, MIDDLE)
+    window = problem_of(with_segments(free_plate((12, 8)), pushing((12, 8)))).moving_plate.supports
+    assert window is not None
+    codes = (0, 0, 1, 0, 0)
+    held = model.Boundary(tuple(NodeCodes(int(n) + 1, 0, codes) for n in window.node))
+    expected = deflections(force, held)
+    springs = deflections(force, pulling_too((12, 8), 1e12))
+    assert np.abs(springs - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+def test_static_supports_that_stay_closed_are_springs() -> None:
+    window = problem_of(with_segments(free_plate((12, 8)), pushing((12, 8)))).moving_plate.supports
+    assert window is not None
+    force = pressed(100.0, *(window.node + 1).tolist())
+    pushed = deflections(force, pushing((12, 8), 10.0))
+    sprung = deflections(force, pulling_too((12, 8), 10.0))
+    assert pushed.min() > 0.0
+    assert np.abs(pushed - sprung).max() < 1e-12 * sprung.max()
+
+
+def test_static_deflections_are_proportional_to_the_force_on_supports_without_gaps() -> None:
+    once, often = (deflections(pressed(f, MIDDLE), pushing((12, 8))) for f in (100.0, 700.0))
+    assert once.min() < 0.0  # the corners lift off
+    assert np.abs(7.0 * once - often).max() < 1e-12 * often.max()
+
+
+@pytest.mark.parametrize(("side", "gap"), [(1, 0.1), (-1, 0.0)])
+def test_a_plate_that_its_open_supports_do_not_hold_has_no_statics(
+    side: int, gap: float, tmp_path: Path
+) -> None:
+    lines = [OneSidedSupport(a, b, side, 0.0, gap) for a, b in window_lines((12, 8))]
+    supports = OneSidedSupports(tuple(lines), word="LINE")
+    path = tmp_path / "open.inp"
+    path.write_text(loaded_deck(SOLVED, pressed(100.0, MIDDLE), supports).to_text())
+    done = call("run", path, "-o", path.with_suffix(".h5"))
+    assert done.exit_code == 2
+    assert "(UNIL) that the present displacement closes do not hold the plate" in done.stderr
+    assert not path.with_suffix(".h5").exists()
+
+
+def test_the_modes_of_a_run_say_which_supports_they_take_as_springs(tmp_path: Path) -> None:
+    path = tmp_path / "modes.inp"
+    deck = loaded_deck(("LMAS", "EIGE 2"), pressed(1.0, MIDDLE), pushing((12, 8)))
+    path.write_text(deck.to_text())
+    done = call("run", path, "-o", path.with_suffix(".h5"))
+    assert "EIGE: the 64 one-sided supports (UNIL) are all closed, and also pull" in done.stderr
+
+
+def test_half_of_a_plate_on_one_sided_supports_is_the_whole(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    deck = with_segments(free_plate((12, 8), duration=2e-4), pushing((12, 8), gap=1e-3))
+    half = run(deck)
+    seen = []
+
+    def whole_plate(plate: PlateModel, _: Floats | None) -> SymmetryReduction:
+        seen.append(plate)
+        return unreduced(plate)
+
+    monkeypatch.setattr(build, "symmetry_reduction", whole_plate)
+    whole = run(deck)
+    assert seen
+    for path in ("history/force", "supports/push", "supports/lift", "energy/plate_strain"):
+        assert np.abs(half[path] - whole[path]).max() < 1e-10 * np.abs(whole[path]).max()
+
+
+def test_a_stopped_run_on_supports_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
+    text = with_segments(free_plate((12, 8), duration=2e-4), pushing((12, 8), gap=1e-3)).to_text()
+    whole, stopped = tmp_path / "whole.h5", tmp_path / "stopped.h5"
+    looks = run_stopped(text, whole)
+    with pytest.raises(StoppedError):
+        run_stopped(text, stopped, looks // 2)
+    run_stopped(text, stopped, resume=True)
+    assert stopped.read_bytes() == whole.read_bytes()
+
+
+def test_a_point_mass_has_its_kinetic_energy_in_a_rigid_motion() -> None:
+    mass, inertia, v = 3e-6, 2e-4, 1.7
+    cards = PointMasses((NodeValues(40, 0, (mass, inertia)),))
+    with_mass, without = (
+        problem_of(deck).plate
+        for deck in (with_segments(free_plate((12, 8)), cards), free_plate((12, 8)))
+    )
+    for dof, added in zip((2, 3, 4), (mass, inertia, inertia), strict=True):
+        motion = np.zeros((*with_mass.mesh.equations.shape[:1], 5))
+        motion[:, dof] = v
+        moving = motion[with_mass.mesh.equations > 0]
+        change = 0.5 * (moving**2 * (with_mass.mass - without.mass)).sum()
+        assert change == pytest.approx(0.5 * added * v**2, rel=1e-12)
+
+
+def test_a_spring_or_a_support_with_a_gap_may_be_under_the_contact_patch() -> None:
+    spring = Springs((NodeValues(MIDDLE, 0, (0.0, 0.0, 5.0, 0.0, 0.0)),))
+    stop = OneSidedSupports((OneSidedSupport(MIDDLE, 0, 1, 1e4, 0.5),))
+    for segment in (spring, stop):
+        loaded = load_deck(with_segments(free_plate((12, 8)), pushing((12, 8)), segment))
+        assert "E445" not in {finding.code for finding in loaded.findings}
+        assert not loaded.errors()

@@ -151,10 +151,7 @@ def _messages(path: Path | None) -> Iterator[None]:
     except (LawError, CriterionError) as error:
         raise RefusedError(f"{error}{end}") from None
     except SingularStiffnessError as error:
-        raise RefusedError(
-            f"{error}: the plate is not restrained and has no static displacement; restrain "
-            f"it with BOUN{end}"
-        ) from None
+        raise RefusedError(f"{error}: {error.remedy}{end}") from None
     except DivergenceError as diverged:
         raise CheckFailedError(
             f"the run diverged at step {diverged.step}: {diverged.reason}{end}"

@@ -55,6 +55,17 @@ NOT_HELD = 1.0e-9
 class SingularStiffnessError(FecmError, ArithmeticError):
     """The supports allow motion without strain."""
 
+    remedy = "the plate is not restrained and has no static displacement; restrain it with BOUN"
+
+
+class LiftedPlateError(SingularStiffnessError):
+    """The one-sided supports that are closed allow motion without strain."""
+
+    remedy = (
+        "the one-sided supports (UNIL) that the present displacement closes do not hold the plate; "
+        "press the plate on supports without gaps, or hold it with SPRI or BOUN"
+    )
+
 
 class ConvergenceError(FecmError, ArithmeticError):
     """Newton's method did not reach equilibrium."""
@@ -194,7 +205,11 @@ class Tangent:
             springs = np.zeros(pinned.shape[0])
             springs[self.pins] = pinned.diagonal()[self.pins]
             pinned = pinned + diags_array(springs, format="csr")
-        self._factors = factorised(pinned)
+        self._error = LiftedPlateError if plate.lifts else SingularStiffnessError
+        try:
+            self._factors = factorised(pinned)
+        except SingularStiffnessError as error:
+            raise self._error(str(error)) from None
 
     def approximate(self, residual: Floats) -> Floats:
         """Return the displacement under a load, (neq,) or (neq, loads), that need not be balanced.
@@ -221,7 +236,7 @@ class Tangent:
             rounding = ROUNDING * (abs(self._stiffness) @ np.abs(displacement)).max()
             limit = max(limit, rounding)
         if not imbalance <= limit:
-            raise SingularStiffnessError("the stiffness is singular")
+            raise self._error("the stiffness is singular")
         return change
 
 

@@ -23,6 +23,7 @@ class SupportState(NamedTuple):
     pull: float  # sum of the pulling forces, force
     closed: int  # number of one-sided supports that touch the plate
     lift: float  # largest distance of the plate from a one-sided support, length; 0 if all touch
+    energy: float  # of springs and one-sided supports, force*length
 
 
 class SupportForces:
@@ -51,6 +52,7 @@ class SupportForces:
             pull=float(np.maximum(forces, 0.0).sum()),
             closed=int((one_sided & (distance < 0.0)).sum()),
             lift=float(distance[one_sided].max(initial=0.0)),
+            energy=supports.energy(displacement),
         )
 
     def _of_restrained_w(self, field: Floats) -> Floats:

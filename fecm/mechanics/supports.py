@@ -86,6 +86,15 @@ class NodeSupports:
         """Return whether each support is closed at displacements of the dofs, (n,)."""
         return np.asarray(~self.is_one_sided | (self.side * displacement >= self.gap))
 
+    def closed_in_words(self, field: Floats) -> str:
+        """Say which one-sided supports count as springs at a displacement field, (numnp, 5)."""
+        one_sided = self.select(self.is_one_sided)
+        opened = int(np.count_nonzero(~one_sided.closed(one_sided.of(field))))
+        count = f"the {len(one_sided.node)} one-sided supports (UNIL)"
+        if opened:
+            return f"{opened} of {count} are open; the closed ones also pull"
+        return f"{count} are all closed, and also pull"
+
     def reactions(self, displacement: Floats) -> Floats:
         """Return the internal force of each support, (n,), at displacements of the dofs, (n,).
 
@@ -100,6 +109,11 @@ class NodeSupports:
         """Return the product of displacements and forces minus twice the energy."""
         depth = np.maximum(self.side * displacement - self.gap, 0.0)
         return float((self.stiffness * self.gap * depth).sum())
+
+    def energy(self, displacement: Floats) -> float:
+        """Return the energy of the supports at displacements of the dofs, (n,)."""
+        work = float((displacement * self.reactions(displacement)).sum())
+        return 0.5 * (work - self.excess_work(displacement))
 
     def forces(self, field: Floats) -> Floats:
         """Return the internal forces of all dofs, (numnp, 5), in a displacement field."""

@@ -262,6 +262,8 @@ def _check_time_step(checked: Problem, findings: Findings) -> None:
     apply(time_step.OF_ROUNDING, findings, checked)
     if (damping := checked.deck.last(model.Damping)) is not None:
         apply(time_step.OF_RESOLUTION, findings, checked, damping)
+    if checked.plate.supports is not None:
+        apply(supports.OF_STEP, findings, checked)
     apply_first(time_step.OF_PLATE, findings, checked)
 
 

@@ -97,10 +97,13 @@ def supports_summary(problem: Problem) -> SupportsSummary | None:
 def flexibility_gain(problem: Problem) -> float | None:
     """Return how much more flexible one-sided supports are than rigid ones, relative.
 
-    Returns None without impact, for more than MOST_SOLVED elements, and for a plate that its
-    supports do not hold.
+    Returns None without impact, for more than MOST_SOLVED elements, with gaps, which leave open
+    what the load closes, and for a plate that its supports do not hold.
     """
+    plate = problem.moving_plate
     if problem.contact is None or problem.deck.control.numel > MOST_SOLVED:
+        return None
+    if plate.supports is None or not plate.lifts or plate.supports.gap.any():
         return None
     with suppress(ConvergenceError):
         if (response := problem.static) is not None:

@@ -298,6 +298,9 @@ class SupportRows(
     lift: Annotated[
         Floats, "rows", "largest distance of the plate from a one-sided support", "length"
     ]
+    energy: Annotated[
+        Floats, "rows", "energy of the supports, part of the strain energy", "force*length"
+    ]
 
 
 class Stresses(

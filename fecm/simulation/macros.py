@@ -240,6 +240,9 @@ def find_modes(run: Simulation, n: int) -> None:
     """Execute EIGE: find the lowest modes, of small motions about the present displacement."""
     state, plate = run.state, run.model.plate
     about = None if plate.is_linear else run.displacement_field()
+    if plate.supports is not None and plate.lifts:
+        closed = plate.supports.closed_in_words(run.displacement_field())
+        state.notes.append(f"EIGE: {closed}")
     natural_modes = modes(plate, n, consistent=state.consistent_mass, field=about)
     pairs = zip(natural_modes.angular_frequency, natural_modes.shapes, strict=True)
     for mode, (omega, shape) in enumerate(pairs, start=1):

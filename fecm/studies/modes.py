@@ -342,10 +342,4 @@ def _notes(problem: Problem) -> Iterator[str]:
             "one part of a plate, only the modes that are symmetric about them are found"
         )
     if plate.supports is not None and plate.lifts:
-        rows = plate.supports.select(plate.supports.is_one_sided)
-        opened = int(np.count_nonzero(rows.gap > 0.0))
-        count = f"the {len(rows.node)} one-sided supports (UNIL)"
-        if opened:
-            yield f"{opened} of {count} have a gap and are open; the closed ones also pull"
-        else:
-            yield f"{count} are all closed, and also pull"
+        yield plate.supports.closed_in_words(np.zeros(plate.mesh.equations.shape))

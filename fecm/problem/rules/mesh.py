@@ -250,8 +250,9 @@ def too_few_supports(problem: Problem) -> Reports:
     Remedy: Restrain every node of a supported edge. A free plate needs no support.
     """
     held = problem.plate.supported.equations == 0
-    count = int(held[:, W].sum())
-    if 0 < count <= FEW_SUPPORTS and held[:, THETA_X:].any(axis=1).sum() <= FEW_SUPPORTS:
+    count = int((problem.mesh.codes[:, W] != 0).sum())
+    few = int(held[:, W].sum()) <= FEW_SUPPORTS  # springs and one-sided supports count
+    if count and few and held[:, THETA_X:].any(axis=1).sum() <= FEW_SUPPORTS:
         segment = problem.deck.last(model.Boundary)
         message = f"w is restrained at {count} node{'s' if count > 1 else ''} only."
         hint = "restrain w at every node of a supported edge; a free plate needs no support"

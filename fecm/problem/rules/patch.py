@@ -101,7 +101,7 @@ def patch_off_the_plate(problem: Problem) -> Reports:
 
 def _held(problem: Problem, patch: ContactPatch) -> str:
     """Name a node or a side under a patch whose w is restrained; empty without one."""
-    mesh = problem.plate.supported
+    mesh = problem.mesh
     held = mesh.codes[:, W] != 0
     centre = np.array([patch.x, patch.y])
     near = np.hypot(*(mesh.coordinates - centre).T) <= patch.radius

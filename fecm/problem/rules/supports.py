@@ -20,6 +20,7 @@ from fecm.mechanics.time_step import safe_time_step
 from fecm.problem.estimates import MOST_SOLVED
 from fecm.problem.generate import node_values
 from fecm.problem.problem import Problem
+from fecm.problem.support_summary import flexibility_gain
 from fecm.problem.supports import (
     NoLineError,
     default_stiffness,
@@ -201,9 +202,8 @@ def soft_supports(problem: Problem) -> Reports:
 
     Remedy: A larger stiffness, or none: the default is rigid enough except on coarse meshes.
     """
-    if not _is_solved(problem) or (response := _settled(problem)) is None:
-        return
-    if (gain := response.gain) > LARGEST_GAIN:
+    gain = flexibility_gain(problem)
+    if gain is not None and gain > LARGEST_GAIN:
         message = f"The supports are soft: they make the plate {gain:.2%} more flexible."
         segment = problem.deck.require(model.OneSidedSupports)
         per_length = " per length" if segment.is_of_lines else ""
@@ -273,4 +273,5 @@ KINDS: tuple[type[model.Segment], ...] = (
 OF_CARDS = (negative_support, unknown_side)
 OF_LINES = (line_off_sides,)
 OF_NODES = (support_of_restrained_w, spring_of_restrained_dof)
-VALUES = (large_gap, supports_decide_step, soft_supports, tips_off)
+OF_STEP = (supports_decide_step,)
+VALUES = (large_gap, soft_supports, tips_off)
