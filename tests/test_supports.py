@@ -635,6 +635,9 @@ def test_half_of_a_plate_on_one_sided_supports_is_the_whole(
 ) -> None:
     deck = with_segments(free_plate((12, 8), duration=2e-4), pushing((12, 8), gap=1e-3))
     half = run(deck)
+    problem = problem_of(deck)
+    plate = problem.moving_plate
+    assert symmetry_reduction(plate, problem.contact).count == pytest.approx(plate.neq / 2, abs=2)
     seen = []
 
     def whole_plate(plate: PlateModel, _: Floats | None) -> SymmetryReduction:
@@ -646,6 +649,26 @@ def test_half_of_a_plate_on_one_sided_supports_is_the_whole(
     assert seen
     for path in ("history/force", "supports/push", "supports/lift", "energy/plate_strain"):
         assert np.abs(half[path] - whole[path]).max() < 1e-10 * np.abs(whole[path]).max()
+
+
+@pytest.mark.parametrize("clamps", ["held", 2000.0])
+def test_the_window_of_a_graded_mesh_leaves_half_of_the_plate(clamps: str | float) -> None:
+    deck = fecm.impact(
+        fecm.Plate.on_fixture("D7136", window="push", clamps=clamps),
+        fecm.Laminate("[45/0/-45/90]3s", "IM7/8552", 0.1833),
+        units="mm-N-s",
+        energy=12e3,
+    )
+    problem = problem_of(deck)
+    plate = problem.moving_plate
+    assert symmetry_reduction(plate, problem.contact).count == pytest.approx(plate.neq / 2, abs=2)
+
+
+def test_a_stiffer_spring_on_one_side_keeps_the_whole_plate() -> None:
+    stiff = OneSidedSupports((OneSidedSupport(window_lines((12, 8))[0][0], 0, 1, 1.0),))
+    problem = problem_of(with_segments(free_plate((12, 8)), pushing((12, 8)), stiff))
+    plate = problem.moving_plate
+    assert symmetry_reduction(plate, problem.contact).count == plate.neq
 
 
 def test_a_stopped_run_on_supports_goes_on_to_the_same_bytes(tmp_path: Path) -> None:

@@ -22,6 +22,8 @@ import numpy as np
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.interpolation import W
 
+ROUNDING = 1e-12  # of stiffnesses that are meant to be equal
+
 
 @dataclass(frozen=True, eq=False)
 class NodeSupports:
@@ -128,6 +130,22 @@ class NodeSupports:
         total = np.zeros((numnp, 5))
         np.add.at(total, (self.node, self.dof), values)
         return total
+
+    def symmetric(self, images: Indices) -> NodeSupports:
+        """Return the supports without rounding errors that break the symmetry of a half turn.
+
+        `images` (numnp,) are the images of the nodes. Stiffnesses that are equal but for rounding
+        become equal; others stay as they are.
+        """
+        order, image_order = (
+            np.lexsort((self.gap, self.side, self.dof, node))
+            for node in (self.node, images[self.node])
+        )
+        stiffness = self.stiffness.copy()
+        stiffness[order] = self.stiffness[image_order]
+        if not np.allclose(stiffness, self.stiffness, ROUNDING, 0.0):
+            return self
+        return replace(self, stiffness=(self.stiffness + stiffness) / 2.0)
 
     def is_invariant(self, images: Indices) -> bool:
         """Return whether a half turn maps the supports onto themselves.

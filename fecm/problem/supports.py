@@ -29,6 +29,7 @@ from fecm.mechanics.joints import sides_of
 from fecm.mechanics.mesh import MeshArrays, element_blocks, extent
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.supports import NodeSupports, one_sided, side_weights
+from fecm.mechanics.symmetry import half_turn_images
 from fecm.mechanics.time_step import safe_time_step
 from fecm.problem.generate import node_values
 
@@ -172,7 +173,9 @@ def node_supports(deck: Deck, plate: PlateModel) -> NodeSupports | None:
         default = default_stiffness(plate, safe_time_step(plate))[nodes]
         stiffness = np.where(stiffness == 0.0, default, stiffness)
     springs_alone = NodeSupports(node, dof, zeros, springs[node, dof], zeros)
-    return springs_alone.joined(one_sided(nodes, side, stiffness, gap))
+    supports = springs_alone.joined(one_sided(nodes, side, stiffness, gap))
+    images = half_turn_images(mesh.coordinates)
+    return supports if images is None else supports.symmetric(images)
 
 
 def default_stiffness(plate: PlateModel, safe_step: float) -> Floats:
