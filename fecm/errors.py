@@ -27,7 +27,7 @@ from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.points import OutsideError, PatchError
 from fecm.mechanics.projectile import ProjectileError
 from fecm.mechanics.reduced_plate import ReductionError
-from fecm.mechanics.solutions import ConvergenceError, SingularStiffnessError
+from fecm.mechanics.solutions import ConvergenceError, LiftedPlateError, SingularStiffnessError
 from fecm.plot.kinds import LackingError, MatplotlibError, PlotError
 from fecm.problem.estimates import NoCurveError
 from fecm.problem.plate_mesh import MeshError
@@ -60,6 +60,7 @@ __all__ = [
     "LackingError",
     "LawError",
     "LayupError",
+    "LiftedPlateError",
     "LocateError",
     "MatplotlibError",
     "MeshError",
