@@ -1,6 +1,7 @@
 """A thousand impacts as a whole process, against their full runs and a plain sparse loop.
 
     python benchmarks/sweep.py [--many] [--write]
+    python benchmarks/sweep.py --one
 
 The report's plate over 800 µs (4000 steps) is hit at 40 velocities with 25 contact coefficients:
 ``fecm sweep`` in a process of its own, from its start to its end, and the same with ``--history``.
@@ -9,6 +10,8 @@ over the peak force.  The plain loop is that of run.py, once, times 1000.
 `--many` also runs 10^5 cases of a grid, 10^5 random ones, and 100 layups at 100 velocities; their
 processor times are compared with those of a full run by NumPy and of a sweep by NumPy, measured in
 turns.
+`--one` measures one case of a D7136 coupon, hit again and again: with the deck that was checked
+before, and checked anew, in turns.
 `--write` keeps the figures in benchmarks/results, under the machine's name.
 """
 
@@ -22,6 +25,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +37,7 @@ import fecm
 from fecm.authoring.case import Case, Value
 from fecm.authoring.values import apply_case
 from fecm.mechanics import kernels
+from fecm.problem import loading
 from fecm.sweeps.case_tables import parse_vary
 from fecm.sweeps.methods import _plate
 
@@ -175,13 +180,28 @@ def throughput() -> dict[str, float | int]:
     }
 
 
+def one_case() -> dict[str, float]:
+    """Processor time of one case on a plate whose response is known, in ms."""
+    deck = fecm.read_one(fecm.examples.path("drop-weight-held"))
+    known, anew = [], []
+    for velocity in range(900, 900 + 4 * ROUNDS):
+        known.append(here(partial(fecm.sweep, deck, {"velocity": [velocity]})))
+        loading._last.cache_clear()
+        anew.append(here(partial(fecm.sweep, deck, {"velocity": [velocity + 0.5]})))
+    return {
+        "one_case_ms": round(1e3 * statistics.median(known[1:]), 1),
+        "one_case_checked_anew_ms": round(1e3 * statistics.median(anew[1:]), 1),
+    }
+
+
 def main() -> None:
     """Measure, print a table, and keep it if asked."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--write", action="store_true", help="keep the figures as JSON")
     parser.add_argument("--many", action="store_true", help="also run 10^5 cases")
+    parser.add_argument("--one", action="store_true", help="only one case on a known plate")
     options = parser.parse_args()
-    figures = measure()
+    figures = one_case() if options.one else measure()
     if options.many:
         figures |= throughput()
     for name, value in figures.items():

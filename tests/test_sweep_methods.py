@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import fecm
+from fecm.deck.model import Indentation
+from fecm.deck.reader import ParsedProblem
+from fecm.problem import loading
+from fecm.problem.check import check_problem
 from fecm.problem.problem import Problem
 from fecm.sweeps import methods
 from fecm.sweeps.methods import METHODS
@@ -108,3 +113,24 @@ def test_cases_whose_time_step_replaces_several_share_the_response_of_their_plat
         np.testing.assert_allclose(
             swept.force[row], result.force, rtol=0, atol=1e-9 * result.force.max()
         )
+
+
+def test_a_deck_that_is_swept_again_is_not_checked_again_unless_it_changed(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    checked: list[float] = []
+
+    def counted(problem: ParsedProblem, *others: Any, **named: Any) -> Problem | None:
+        assert problem.deck is not None
+        checked.append(problem.deck.require(Indentation).k)
+        return check_problem(problem, *others, **named)
+
+    monkeypatch.setattr(loading, "check_problem", counted)
+    path = tmp_path / "deck.inp"
+    path.write_text(small(STEPS).replace("1912000", "1700000"), encoding="utf-8")
+    first, second = (fecm.sweep(path, {"velocity": [velocity]}) for velocity in (50.0, 60.0))
+    assert checked == [1.7e6]
+    path.write_text(small(STEPS).replace("1912000", "1600000"), encoding="utf-8")
+    softer = fecm.sweep(path, {"velocity": [60.0]})
+    assert checked == [1.7e6, 1.6e6]
+    assert first["peak_force"] < second["peak_force"] != softer["peak_force"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -72,12 +73,30 @@ def load_deck(
     before it is checked; problems may then lack a program. Raises OSError if the file can't be
     read.
     """
-    if isinstance(deck, LoadedDeck):
-        return deck
-    if isinstance(deck, Deck):
-        text, source = deck.to_text(), "<deck>"
-    else:
-        text, source = load_text(deck)
+    return deck if isinstance(deck, LoadedDeck) else _load(*_text(deck), mode, change)
+
+
+def load_again(deck: AnyDeck) -> LoadedDeck:
+    """Read and check a deck, as :func:`load_deck` does, or return the last one if it is the same.
+
+    For jobs that are repeated with one deck, which must not change what they get.
+    """
+    return deck if isinstance(deck, LoadedDeck) else _last(*_text(deck))
+
+
+def _text(deck: str | Path | AnyFile | Deck) -> tuple[str, str]:
+    """Return the text of a deck and the name of its source."""
+    return (deck.to_text(), "<deck>") if isinstance(deck, Deck) else load_text(deck)
+
+
+@lru_cache(maxsize=1)
+def _last(text: str, source: str) -> LoadedDeck:
+    return _load(text, source)
+
+
+def _load(
+    text: str, source: str, mode: str = REPORT, change: Callable[[Deck], Deck] | None = None
+) -> LoadedDeck:
     listing = mode == LISTING
     reader = Reader(text, blanks_are_zeros=listing, needs_program=change is None)
     problems: list[Problem] = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +45,11 @@ def doubtful_values(checked: Problem, cases: Sequence[Case]) -> list[str]:
     and the largest value of each name, one name at a time.
     """
     notes = [*_notes_of_places(checked, cases), *_notes_of_symmetry(checked, cases)]
-    known_findings = {(finding.code, finding.message) for finding in _findings(checked)}
+
+    @cache
+    def known() -> set[tuple[str, str]]:  # needed where a value has findings, which is rare
+        return {(finding.code, finding.message) for finding in _findings(checked)}
+
     for name in cases[0]:
         if name not in JUDGED:
             continue
@@ -56,7 +61,7 @@ def doubtful_values(checked: Problem, cases: Sequence[Case]) -> list[str]:
             doubts = [
                 finding
                 for finding in _of_value(checked, name, value)
-                if (finding.code, finding.message) not in known_findings
+                if (finding.code, finding.message) not in known()
             ]
             if not doubts:
                 continue

@@ -25,7 +25,7 @@ from fecm.deck.catalogue import system_of
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import own_law
 from fecm.problem.build import RunOptions
-from fecm.problem.loading import AnyDeck, LoadedDeck, load_deck, sole
+from fecm.problem.loading import AnyDeck, LoadedDeck, load_again, load_deck, sole
 from fecm.problem.problem import Problem
 from fecm.simulation.job import Price, ProblemRun
 from fecm.sweeps.case_tables import (
@@ -548,7 +548,7 @@ class Sweep:
 
 
 def _loaded(deck: AnyDeck) -> LoadedDeck:
-    loaded = load_deck(deck)
+    loaded = load_again(deck)
     loaded.refuse_errors(force=True)
     sole(loaded.problems, loaded.source)
     return loaded
