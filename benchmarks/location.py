@@ -3,19 +3,25 @@
     python benchmarks/location.py models
     python benchmarks/location.py seeds [NUMBER]
     python benchmarks/location.py mesh [NUMBER]
+    python benchmarks/location.py speed
 
 The strains are those of a run of examples/panel-with-gages.inp struck at 112.5, 81 mm, every 2 us,
 with a normal scatter of 2 % of the largest strain of each gage.  `models` locates the impact with
 decks that are wrong by some per cent and prints the table of docs/locate.md.  `seeds` repeats the
 scatter 100 times and prints how often the 95 % ellipse covers the place, for strains of the same
 deck and for those of a series solution (examples/panel-strains.csv is one of them).  `mesh` does so
-for a small panel of 10 x 8 elements and strains of 20 x 16 elements.
+for a small panel of 10 x 8 elements and strains of 20 x 16 elements.  `speed` prints processor
+times: of a location, of the bisection of its mesh, and of the shares of the nodes at a place, with
+the blocks of the mesh kept and built anew, in turns.
 """
 
 from __future__ import annotations
 
+import statistics
 import sys
+import time
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,6 +31,11 @@ import numpy as np
 import fecm
 from fecm._typing import Floats
 from fecm.deck.model import Patch
+from fecm.location.model import Footprint
+from fecm.mechanics.mesh import MeshArrays
+from fecm.mechanics.points import patch_weights
+from fecm.problem.loading import load_one
+from fecm.problem.refine import refined_deck
 
 ROOT = Path(__file__).parent.parent
 SERIES = ROOT / "tests" / "data" / "locate_public.csv"
@@ -173,6 +184,34 @@ def mesh(number: int) -> None:
     print(f"strains of elements half as long: {inside} of {number} inside the 95 % ellipse")
 
 
+def seconds(compute: Callable[[], object]) -> float:
+    """Processor time of a call."""
+    begin = time.process_time()
+    compute()
+    return time.process_time() - begin
+
+
+def speed(rounds: int = 5) -> None:
+    """Print processor times of a location and of its parts."""
+    strains = fecm.examples.path("panel-strains.csv")
+    problem = load_one(DECK)
+    mesh: MeshArrays = problem.mesh
+    circle, held = ("DISC", 4.0), np.zeros(len(mesh.coordinates), dtype=bool)
+    footprint, (x, y) = Footprint(mesh, *circle, held), PLACE
+    parts: dict[str, Callable[[], object]] = {
+        "location of the example": lambda: fecm.locate(DECK, strains),
+        "bisected mesh": lambda: refined_deck(DECK, mesh),
+        "300 places, blocks kept": lambda: [footprint.weights(x, y) for _ in range(300)],
+        "300 places, blocks anew": lambda: [patch_weights(mesh, *circle, x, y) for _ in range(300)],
+    }
+    with warnings.catch_warnings(action="ignore", category=fecm.FecmWarning):
+        table = [[seconds(compute) for compute in parts.values()] for _ in range(rounds)]
+    for name, column in zip(parts, zip(*table, strict=True), strict=True):
+        print(
+            f"{name:26}{statistics.median(column):7.2f} s, {min(column):.2f} to {max(column):.2f}"
+        )
+
+
 if __name__ == "__main__":
     match sys.argv[1:]:
         case ["models"]:
@@ -181,6 +220,8 @@ if __name__ == "__main__":
             seeds(100)
         case ["seeds", text]:
             seeds(int(text))
+        case ["speed"]:
+            speed()
         case ["mesh"]:
             mesh(100)
         case ["mesh", text]:

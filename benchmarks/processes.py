@@ -29,6 +29,12 @@ COMMANDS = {
     "check impact-115": ["-m", "fecm", "check", str(DECKS / "impact-115.inp")],
     "info": ["-m", "fecm", "info", "impact-115.h5"],
     "estimate drop-weight": ["-m", "fecm", "estimate", str(EXAMPLES / "drop-weight.inp")],
+    "new of 160,000 elements": [
+        *("-m", "fecm", "new", "large.inp", "--overwrite", "--size", "400x400"),
+        *("--mesh", "400x400", "--support", "simple", "--layup", "[0/90]4s"),
+        *("--material", "IM7/8552", "--projectile", "mass:1e-3", "--contact", "estimate:8"),
+        *("--velocity", "3m/s", "--duration", "1ms"),
+    ],
     "--version": ["-m", "fecm", "--version"],
     "plot": ["-m", "fecm", "plot", "impact-115.h5", "--overwrite"],
 }

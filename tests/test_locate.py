@@ -13,12 +13,14 @@ import pytest
 
 import fecm
 from fecm.deck import model
-from fecm.location.model import Sampling, moving_plate, responses, rows_of
+from fecm.location import model as location_model
+from fecm.location.model import Footprint, Sampling, moving_plate, responses, rows_of
 from fecm.location.prepare import shared_symmetry
+from fecm.mechanics.mesh import ElementBlock, Ints, element_blocks
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.points import gages, patch_weights
 from fecm.problem.generate import generate
-from fecm.problem.loading import sole_problem
+from fecm.problem.loading import load_one, sole_problem
 from fecm.problem.parts import build_plate
 from fecm.sweeps.responses import plate_response
 from tests.panels import (
@@ -644,3 +646,23 @@ def test_gages_at_the_centre_cant_tell_a_half_turn() -> None:
     deck = with_gages(panel(), *[(50.0, 40.0, 0.72, angle) for angle in (0.0, 45.0, 90.0)])
     with pytest.raises(fecm.LocateError, match="half turn"):
         fecm.locate(deck, (TIME, struck()[1]))
+
+
+def test_places_of_a_location_share_the_blocks_of_its_mesh(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    built: list[int] = []
+
+    def counted(elements: Ints, coordinates: Floats) -> list[ElementBlock]:
+        built.append(len(elements))
+        return element_blocks(elements, coordinates)
+
+    monkeypatch.setattr(location_model, "element_blocks", counted)
+    mesh = load_one(fecm.examples.path("panel-with-gages")).mesh
+    held = np.zeros(len(mesh.coordinates), dtype=bool)
+    footprint = Footprint(mesh, "DISC", 4.0, held)
+    for place in ((112.5, 81.0), (60.0, 47.0)):
+        np.testing.assert_array_equal(
+            footprint.weights(*place), patch_weights(mesh, "DISC", 4.0, *place)
+        )
+    assert built == [len(mesh.elements)]

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import replace
+from functools import cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +23,7 @@ from fecm.deck.model import (
     Forces,
     Segment,
 )
-from fecm.mechanics.mesh import Ints, MeshArrays, element_blocks
+from fecm.mechanics.mesh import ElementBlock, Ints, MeshArrays, element_blocks
 
 # Corners at the ends of each side, and the local coordinate that runs along it.
 _SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))
@@ -47,16 +49,13 @@ def refined_deck(deck: Deck, mesh: MeshArrays, marked: Bools | None = None) -> D
         if count not in (4, 9) or block.shape.nodes != 9:
             why = "it does not have four or nine nodes"
             raise RefineError(f"element {block.rows[0] + 1} cannot be bisected: {why}")
-        local = np.stack([block.shape.xi, block.shape.eta], axis=1)[:count]
+        spots = cache(partial(_spots, block))
         for row in block.rows.tolist():
-            cuts = [2 if split[row, axis] else 1 for axis in (0, 1)]
+            cuts = tuple(2 if split[row, axis] else 1 for axis in (0, 1))
             corners = mesh.elements[row, :count]
-            for i, j in np.ndindex(*cuts):
-                low = np.array([-1.0 + 2.0 * i / cuts[0], -1.0 + 2.0 * j / cuts[1]])
-                point = low + (local + 1.0) / cuts
-                values = block.shape.shape_functions(point[:, 0], point[:, 1], block.present)[0]
-                spots = zip(point.tolist(), values[:, block.present], strict=True)
-                elements.append((row, [nodes.number(row, corners, tuple(p), n) for p, n in spots]))
+            for part in np.ndindex(*cuts):
+                numbers = [nodes.number(row, corners, spot) for spot in spots(cuts, part)]
+                elements.append((row, numbers))
     return _rebuilt(deck, mesh, nodes, sorted(elements))
 
 
@@ -76,6 +75,34 @@ def _split_sides(mesh: MeshArrays, marked: Bools) -> Bools:
             return pairs
 
 
+class _Spot(NamedTuple):
+    """Place of a node of a part in an old element."""
+
+    place: tuple[float, ...]  # local coordinates in the old element
+    shares: Floats  # of the old element's nodes, (nodes,)
+    old: int | None  # the old node at this place
+    side: int | None  # the old side that it is on
+    along: float  # position from the first end of the side to the second
+
+
+def _spots(block: ElementBlock, cuts: tuple[int, ...], part: tuple[int, ...]) -> list[_Spot]:
+    """Return the places of the nodes of a part, counted along xi and eta, of an element."""
+    count = block.nodes.shape[1]
+    local = np.stack([block.shape.xi, block.shape.eta], axis=1)[:count]
+    low = np.array([-1.0 + 2.0 * number / total for number, total in zip(part, cuts, strict=True)])
+    point = low + (local + 1.0) / cuts
+    values = block.shape.shape_functions(point[:, 0], point[:, 1], block.present)[0]
+    spots = []
+    for place, shares in zip(point.tolist(), values[:, block.present], strict=True):
+        old = np.flatnonzero(np.abs(shares - 1.0) < 1e-9).tolist()
+        across = zip((1, 0, 1, 0), (-1.0, 1.0, 1.0, -1.0), strict=True)
+        on = [n for n, (axis, position) in enumerate(across) if abs(place[axis] - position) < 1e-9]
+        along = place[_ALONG[on[0]]] * (1 if on[0] < 2 else -1) if on else 0.0
+        node, side = (numbers[0] if numbers else None for numbers in (old, on))
+        spots.append(_Spot(tuple(place), shares, node, side, along))
+    return spots
+
+
 class _Nodes:
     """Old and new nodes: coordinates, restraint codes and prescribed values."""
 
@@ -86,24 +113,19 @@ class _Nodes:
         self.codes = list(mesh.codes)
         self.forces = list(mesh.forces)
 
-    def number(self, row: int, nodes: Ints, place: tuple[float, ...], shares: Floats) -> int:
+    def number(self, row: int, nodes: Ints, spot: _Spot) -> int:
         """Return the number of the node at a place of an old element; a new node gets a number."""
-        old = np.flatnonzero(np.abs(shares - 1.0) < 1e-9)
-        if len(old):
-            return int(nodes[old[0]])
-        across = zip((1, 0, 1, 0), (-1.0, 1.0, 1.0, -1.0), strict=True)
-        on = [n for n, (axis, position) in enumerate(across) if abs(place[axis] - position) < 1e-9]
-        key: Hashable = (row, place)
-        around = nodes
-        if on:
-            ends = [int(nodes[corner]) for corner in _SIDES[on[0]]]
-            t = place[_ALONG[on[0]]] * (1 if on[0] < 2 else -1)  # from the first end to the second
-            key = (min(ends), max(ends), t if ends[0] < ends[1] else -t)
-            around = nodes[np.abs(shares) > 1e-12]
+        if spot.old is not None:
+            return int(nodes[spot.old])
+        key: Hashable = (row, spot.place)
+        if spot.side is not None:
+            first, second = (int(nodes[corner]) for corner in _SIDES[spot.side])
+            key = (first, second, spot.along) if first < second else (second, first, -spot.along)
         if key not in self._known:
             self._known[key] = len(self.coordinates) + 1
-            mesh, rows = self._mesh, nodes - 1
-            codes = (mesh.codes[around - 1] != 0).all(axis=0).astype(np.int32)
+            mesh, rows, shares = self._mesh, nodes - 1, spot.shares
+            around = rows if spot.side is None else rows[np.abs(shares) > 1e-12]
+            codes = (mesh.codes[around] != 0).all(axis=0).astype(np.int32)
             self.coordinates.append(shares @ mesh.coordinates[rows])
             self.codes.append(codes)
             self.forces.append(np.where(codes != 0, shares @ mesh.forces[rows], 0.0))
