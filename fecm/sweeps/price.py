@@ -40,7 +40,8 @@ def expected(problem: Problem, definition: Plan, workers: int | None) -> str:
     if motions < count:
         runs = f"{motions} full run{'' if motions == 1 else 's'}"
         count = motions
-    text = f"a nonlinear plate has no impulse response: {cases}, {runs}"
+    words = problem.deck.nonlinear_words
+    text = f"a plate with {words} has no impulse response: {cases}, {runs}"
     _, seconds = work_of_runs(problem, definition)
     if math.isnan(seconds):
         return text
