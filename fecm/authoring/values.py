@@ -188,8 +188,8 @@ PLATE_VALUES: tuple[SweepValue[PlateSetter], ...] = (
              meaning="`AxB`: sides of the plate; coordinates are scaled along x and y, and with "
                      "them the centre of the patch and the gages"),
     SweepValue("support", Changes.PLATE, "", plate.set_support, ValueKind.TEXT,
-             meaning="`free`, `simple`, `pinned` or `clamped`: [support](#supports-of-the-outline) "
-                     "of the outline"),
+             meaning="`free`, `soft`, `simple`, `pinned` or `clamped`: "
+                     "[support](#supports-of-the-outline) of the outline"),
     SweepValue("edge_kr", Changes.PLATE, "", supports.set_edge_rotation,
              meaning="factor of the stiffness of the rotations on all `SPRI LINE` "
                      "([elastic edges](supports.md#elastic-edges))"),
