@@ -382,7 +382,8 @@ def test_summary_json_page_and_picture_name_the_metal_that_yields(tmp_path: Path
     assert (failure["mode"], failure["materials"]) == ("yield", ["2024-T3"])
     call("report", "g.h5", "-o", "g.html", cwd=tmp_path)
     page = (tmp_path / "g.html").read_text()
-    assert f"yield ({first.criterion.replace('_', ' ')}), {place}" in page
+    criterion = first.criterion.replace("_", " ")
+    assert f'<th scope="row">{criterion}</th>\n<td>yield</td>\n<td>{place}</td>' in page
     assert "1: 2024-T3" in page
     call("plot", "g.h5", "--kind", "failure", "-o", "g.svg", cwd=tmp_path)
     picture = (tmp_path / "g.svg").read_text()

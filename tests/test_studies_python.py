@@ -139,7 +139,8 @@ def test_a_fit_is_what_the_command_prints_of_a_file_or_of_arrays(tmp_path: Path)
     assert listed["k"] == {"value": actual.k.value, "error": actual.k.error}
     columns = np.loadtxt(path, delimiter=",", skiprows=3, unpack=True)
     same = fecm.fit_indentation((columns[0], columns[1]), units=units)
-    assert str(same) == str(actual)
+    record = next(line for line in str(actual).splitlines() if line.lstrip().startswith("record "))
+    assert str(same) == str(actual).replace(f"{record}\n", "")
     # The report's constants of the 0.5 in indenter, of which the example is made.
     assert actual.k.value == pytest.approx(1.330e6, abs=3.0 * actual.k.error)
     assert actual.law is not None
