@@ -227,7 +227,8 @@ def main(kind: str, *names: str) -> None:
             problem = problem_of(case, mesh, grading)
             place = problem.load_place
             assert place is not None
-            circle = CircleStresses(problem.families, place, reach, problem.plate.rows_by_laminate)
+            families, rows = problem.mesh.families, problem.plate.rows_by_laminate
+            circle = CircleStresses(families, place, reach, rows)
             at_load = load_mesh(problem, circle.elements)
             result = fecm.run_one(deck(case, mesh, grading, duration))
             largest = {row.criterion: row.exposure for row in largest_exposures(result)}

@@ -121,7 +121,6 @@ OTHER_PLATES: dict[str, tuple[Callable[[], fecm.Deck], Literal["report", "listin
 }
 
 
-@pytest.mark.few(5)
 @pytest.mark.parametrize("plate", OTHER_PLATES)
 def test_every_kind_of_plate_has_parts_with_the_numbers_of_the_whole(plate: str) -> None:
     build, mode = OTHER_PLATES[plate]

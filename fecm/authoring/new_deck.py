@@ -349,9 +349,7 @@ def author(options: ImpactOptions) -> Authored:
     deck = with_impact_program(options, structure, dt, motion.duration)
     comments = structure.comment + comment
     if fixture is not None:
-        names = units_of(plies.system) if plies.system else {}
-        band = band_comment(structure, tips_on(mesh, fixture), names)
-        comments = fixture.comment + band + comments
+        comments = fixture.comment + band_comment(structure, tips_on(mesh, fixture)) + comments
     return Authored(deck, comments, [*notes, *structure.notes], doubts)
 
 

@@ -25,7 +25,7 @@ from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck import model
 from fecm.deck.macros import EXTENDED, TESTS, steps_of_plies, with_outputs
 from fecm.deck.model import Allowables, Deck, Macro, Patch, Shear
-from fecm.deck.units import quantity, unit_of
+from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.judge.validity import IN_PLANE_WORDS
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.points import HERTZ
@@ -218,23 +218,23 @@ def problem_of(deck: model.Deck) -> Problem | None:
     return None if loaded.errors() else loaded.problems[0]
 
 
-def band_comment(structure: SupportedDeck, tips: Sequence[int], names: dict[str, str]) -> str:
+def band_comment(structure: SupportedDeck, tips: Sequence[int]) -> str:
     """Return comment lines with the static flexibility of a plate on a window, held and pushed.
 
-    `tips` are the nodes, from 1, of the tips of clamps, and `names` those of the units. A deck with
-    errors and a very fine mesh have no such lines.
+    `tips` are the nodes, from 1, of the tips of clamps. A deck with errors and a very fine mesh
+    have no such lines.
     """
     if structure.deck.control.numel > MOST_ELEMENTS:
         return ""
     problem = structure.problem or problem_of(structure.deck)
     if problem is None:
         return ""
-    found = compliances_on_window(problem, np.array(tips, dtype=int) - 1)
-    if found is None:
+    compliances = compliances_on_window(problem, np.array(tips, dtype=int) - 1)
+    if compliances is None:
         return ""
-    unit, factor = unit_of("length/force", names), problem.symmetry.factor
-    held, pushed, clamped = (quantity(value / factor, unit) for value in found)
-    softer, stiffer = (f"{value / found.held - 1.0:+.1%}" for value in found[1:])
+    unit, factor = unit_of("length/force", unit_names(structure.deck)), problem.symmetry.factor
+    held, pushed, clamped = (quantity(value / factor, unit) for value in compliances)
+    softer, stiffer = (f"{value / compliances.held - 1.0:+.1%}" for value in compliances[1:])
     with_clamps = f", with clamps that hold the corners {clamped} ({stiffer})" if tips else ""
     return (
         f"! Static flexibility: {held} with w = 0 along the window; on a window that only pushes\n"

@@ -18,7 +18,7 @@ from fecm.deck import model
 from fecm.deck.layup import LayupError, parse_layup
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Layer, NodeCodes, NodeValues
-from fecm.mechanics.mesh import element_blocks, holds_the_plane
+from fecm.mechanics.mesh import holds_the_plane
 from fecm.mechanics.points import containing_elements
 from fecm.problem.generate import generate, restraint_codes
 from fecm.problem.parts import is_curved, moves_in_plane
@@ -229,8 +229,8 @@ def set_place(deck: model.Deck, value: Value) -> model.Deck:
     if patch is not None:
         return swapped(deck, patch, replace(patch, x=x, y=y, source=None))
     mesh = generate(deck)
-    blocks = element_blocks(mesh.elements, mesh.coordinates)
-    if not any(len(containing_elements(block, np.array([[x, y]]))[0]) for block in blocks):
+    point = np.array([[x, y]])
+    if not any(len(containing_elements(block, point)[0]) for block in mesh.families):
         raise CasesError(f"at {value} is outside the plate")
     distances = np.hypot(*(mesh.coordinates - (x, y)).T)
     return set_impact_node(deck, int(np.where(mesh.used, distances, np.inf).argmin()) + 1)

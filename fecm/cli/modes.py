@@ -143,27 +143,27 @@ def modes_command(
         check_suffix(PictureKind.MODES, picture)
     check_outputs([path for path in (picture, output) if path is not None], overwrite, [deck])
     with refusing_errors("; no modes were computed"):
-        found = modes(deck, number, mass=mass, held=held, output=output, overwrite=overwrite)
+        natural = modes(deck, number, mass=mass, held=held, output=output, overwrite=overwrite)
     if picture is not None:
-        drawn = draw(PictureKind.MODES, {deck.stem: found.result})
+        drawn = draw(PictureKind.MODES, {deck.stem: natural.result})
         save_picture(drawn, picture, overwrite=overwrite)
-    note(*found.notes)
-    _print(found, form)
+    note(*natural.notes)
+    _print(natural, form)
 
 
-def _csv(found: PlateModes) -> Iterator[str]:
+def _csv(natural: PlateModes) -> Iterator[str]:
     """Return the lines of a table of the modes."""
     names = (
         "number",
-        column_name("frequency", found.frequency_unit),
-        column_name("period", found.units.get("time", "")),
+        column_name("frequency", natural.frequency_unit),
+        column_name("period", natural.units.get("time", "")),
         "share",
         "lines_across_x",
         "lines_across_y",
     )
     rows = (
         (mode["number"], mode["frequency"], mode["period"], mode["share"], *_lines(mode))
-        for mode in found.to_dict()["modes"]
+        for mode in natural.to_dict()["modes"]
     )
     return csv_lines(chain([names], rows))
 
@@ -173,11 +173,11 @@ def _lines(mode: ModeJson) -> Sequence[object]:
     return mode["nodal_lines"] or ("", "")
 
 
-def _print(found: PlateModes, form: Format) -> None:
+def _print(natural: PlateModes, form: Format) -> None:
     """Print the modes in a format."""
     if form is Format.JSON:
-        echo_json(found.to_dict())
+        echo_json(natural.to_dict())
     elif form is Format.CSV:
-        sys.stdout.writelines(_csv(found))
+        sys.stdout.writelines(_csv(natural))
     else:
-        echo(found)
+        echo(natural)

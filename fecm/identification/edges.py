@@ -40,7 +40,7 @@ from fecm.problem.loading import AnyDeck
 from fecm.problem.problem import Problem
 from fecm.problem.supports import SAME_PLACE, NoLineError, line_weights
 from fecm.problem.symmetry import symmetry_lines
-from fecm.studies.modes import problem_of_modes
+from fecm.studies.modes import FrequenciesJson, problem_of_modes
 
 KR, KW = "kr", "kw"
 DIMENSIONS = {KR: "force", KW: MODULUS}
@@ -105,12 +105,9 @@ class StiffnessJson(TypedDict):
     unit: str
 
 
-class EdgeFitJson(TypedDict):
+class EdgeFitJson(FrequenciesJson):
     """Fit of edge stiffness in JSON."""
 
-    title: str
-    units: Annotated[dict[str, str], "Names of the units; empty if the deck names none."]
-    frequency_unit: Annotated[str, "Hz if the deck's unit of time is known."]
     edges: list[str]
     stiffness: list[StiffnessJson]
     misfit: Annotated[float, "Root mean square of ln f measured over computed."]
@@ -337,7 +334,7 @@ def edges_of(mesh: MeshArrays) -> dict[str, Edge]:
     """
     low, high = extent(mesh.coordinates[mesh.used])
     near = SAME_PLACE * float((high - low).max())
-    found = {}
+    edges = {}
     for name, axis, place in zip(EDGES, (0, 0, 1, 1), (low, high, low, high), strict=True):
         on_edge = mesh.used & (np.abs(mesh.coordinates[:, axis] - place[axis]) <= near)
         nodes = np.flatnonzero(on_edge)
@@ -353,8 +350,8 @@ def edges_of(mesh: MeshArrays) -> dict[str, Edge]:
                 f"the {name} side of the plate is not a straight edge over its whole length: the "
                 "edges of rectangles along x and y have a stiffness to fit"
             )
-        found[name] = Edge(name, rows, weights, (first, last))
-    return found
+        edges[name] = Edge(name, rows, weights, (first, last))
+    return edges
 
 
 class ElasticPlate:
@@ -372,15 +369,15 @@ class ElasticPlate:
 
         self.names, self.count, self.consistent = list(names), count + SPARE, consistent
         self._control = problem.deck.control
-        found = edges_of(problem.mesh)
+        all_edges = edges_of(problem.mesh)
         for line in symmetry_lines(problem.deck, problem.mesh):
             name = EDGES[2 * line.axis + line.is_high]
             if name in edges:
                 raise IdentifyError(
                     f"the {name} edge is held as a line of symmetry is: name the other edges"
                 )
-        self._edges = [found[name] for name in edges]
-        self.plate = self._supported(problem.plate, found)
+        self._edges = [all_edges[name] for name in edges]
+        self.plate = self._supported(problem.plate, all_edges)
         if self.count > self.plate.neq:
             raise IdentifyError(f"the mesh has too few dofs for mode {count}: refine it")
         free = self.plate.mesh.equations > 0
@@ -394,13 +391,13 @@ class ElasticPlate:
         scales = {KR: rigidity / side, KW: math.pi**4 * rigidity / side**3}
         self.scale = np.array([scales[name] for name in self.names])
 
-    def _supported(self, plate: PlateModel, found: Mapping[str, Edge]) -> PlateModel:
+    def _supported(self, plate: PlateModel, edges: Mapping[str, Edge]) -> PlateModel:
         """Return the plate whose edges hold what springs do not."""
         restraint = RESTRAINTS[ON_SPRINGS if KW in self.names else "simple"]
         chosen = [edge.name for edge in self._edges]
-        others = [edge.nodes for name, edge in found.items() if name not in chosen]
+        kept = [edge.nodes for name, edge in edges.items() if name not in chosen]
         nodes = np.unique(np.concatenate([edge.nodes for edge in self._edges]))
-        released = np.setdiff1d(nodes, np.concatenate([[-1], *others]))
+        released = np.setdiff1d(nodes, np.concatenate([[-1], *kept]))
         codes = plate.mesh.codes.copy()
         codes[released, W:] = 0
         for edge in self._edges:
@@ -441,9 +438,9 @@ class ElasticPlate:
         if kept is not None:
             springs = kept.select(codes[kept.node, kept.dof] == 0).joined(springs)
         plate = replace(plate, supports=springs)
-        found = modes(plate, self.count, consistent=self.consistent)
-        shapes = np.array([plate.field(shape, 0.0)[free] for shape in found.shapes])
-        return found.angular_frequency**2, shapes
+        natural = modes(plate, self.count, consistent=self.consistent)
+        shapes = np.array([plate.field(shape, 0.0)[free] for shape in natural.shapes])
+        return natural.angular_frequency**2, shapes
 
     def cards(self, values: Mapping[str, float]) -> Iterator[str]:
         """Yield the lines of a SPRI segment with values of the edges."""
@@ -586,9 +583,9 @@ class _Fit:
             return residual, -slopes[:, free]
 
         bounds = self._least[free], self._most[free]
-        found = least_squares(lambda y: at(y)[0], start[free], lambda y: at(y)[1], bounds=bounds)
+        fit = least_squares(lambda y: at(y)[0], start[free], lambda y: at(y)[1], bounds=bounds)
         x = start.copy()
-        x[free] = found.x
+        x[free] = fit.x
         return x
 
     def _bound(self, x: Floats, j: int) -> tuple[str, float] | None:

@@ -10,7 +10,7 @@ on b. One run per gage gives the strains of an impulse anywhere.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -24,7 +24,7 @@ from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.impact_steps import ImpactSteps, can_step
 from fecm.mechanics.interpolation import NDOF, W, local_shape_functions
-from fecm.mechanics.mesh import ElementBlock, MeshArrays, element_blocks
+from fecm.mechanics.mesh import MeshArrays
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import AppliedForce, PlateMotion
 from fecm.mechanics.points import GageArray, OutsideError, containing_elements, patch_weights
@@ -135,27 +135,19 @@ class Footprint:
         Raises PatchError or OutsideError if the circle, or the point, is not on the plate.
         """
         if self.shape:
-            circle = self.shape, self.radius, x, y
-            shares = patch_weights(self.mesh, *circle, self._families)
+            shares = patch_weights(self.mesh, self.shape, self.radius, x, y)
         else:
-            shares = point_weights(self.mesh, x, y, self._families)
+            shares = point_weights(self.mesh, x, y)
         return np.asarray(np.where(self.held, 0.0, shares))
 
-    @cached_property
-    def _families(self) -> list[ElementBlock]:
-        return element_blocks(self.mesh.elements, self.mesh.coordinates)
 
-
-def point_weights(
-    mesh: MeshArrays, x: float, y: float, families: Sequence[ElementBlock] = ()
-) -> Floats:
+def point_weights(mesh: MeshArrays, x: float, y: float) -> Floats:
     """Return the share of each node in a unit force at a point, (nodes,): the shape functions.
 
-    `families` are the blocks of the mesh, if they are known.
     Raises OutsideError if the point is not on the plate.
     """
     point, weights = np.array([[x, y]]), np.zeros(len(mesh.coordinates))
-    for family in families or element_blocks(mesh.elements, mesh.coordinates):
+    for family in mesh.families:
         members, _, xi = containing_elements(family, point)
         if len(members):
             rule = Quadrature(xi[:1, 0], xi[:1, 1], np.ones(1))

@@ -9,7 +9,7 @@ node or element n.  An absent node of an element and the equation of a restraine
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -55,6 +55,18 @@ class MeshArrays:
     codes: Ints
     forces: Floats
     equations: Ints
+
+    def __getstate__(self) -> dict[str, object]:
+        """Return the arrays: a copy in another process finds blocks again."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @cached_property
+    def families(self) -> list[ElementBlock]:
+        """Elements in blocks with the same nodes present.
+
+        Raises ValueError if an element lacks a corner.
+        """
+        return element_blocks(self.elements, self.coordinates)
 
     @property
     def number_of_equations(self) -> int:

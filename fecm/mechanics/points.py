@@ -15,7 +15,7 @@ from fecm._errors import FecmError
 from fecm._typing import Floats, Indices
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, interpolate
-from fecm.mechanics.mesh import ElementBlock, MeshArrays, element_blocks, larger
+from fecm.mechanics.mesh import ElementBlock, MeshArrays, larger
 from fecm.mechanics.strains import FLAT, Curvature, strain_of_deflection
 
 # Tolerance, in local coordinates, for points on the edge of an element.
@@ -114,20 +114,12 @@ class PatchError(FecmError, ValueError):
     """A part of the patch is not on the plate."""
 
 
-def patch_weights(
-    mesh: MeshArrays,
-    shape: str,
-    radius: float,
-    x: float,
-    y: float,
-    families: Sequence[ElementBlock] = (),
-) -> Floats:
+def patch_weights(mesh: MeshArrays, shape: str, radius: float, x: float, y: float) -> Floats:
     """Return nodal weights of w, (numnp,), of a unit pressure on a circle; their sum is 1.
 
-    `families` are the blocks of the mesh, if they are known.
     Raises PatchError if a part of the circle is not on the plate.
     """
-    families = families or element_blocks(mesh.elements, mesh.coordinates)
+    families = mesh.families
     weights, side = _sum_weights(families, len(mesh.coordinates), shape, radius, (x, y), 1)
     if radius > SIDES * side * (1.0 + MARGIN):
         times = math.ceil(math.sqrt(radius / (SIDES * side)))
@@ -243,7 +235,7 @@ def gages(
     nonlinear: bool = False,
 ) -> GageArray:
     """Express the strains of gages by dofs; raises OutsideError for a gage outside the plate."""
-    families = element_blocks(mesh.elements, mesh.coordinates)
+    families = mesh.families
     sums = [_functional(families, record, transposed_jacobian, curvature) for record in records]
     rows = [linear for linear, _ in sums]
     if nonlinear:

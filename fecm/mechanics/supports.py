@@ -88,15 +88,6 @@ class NodeSupports:
         """Return whether each support is closed at displacements of the dofs, (n,)."""
         return np.asarray(~self.is_one_sided | (self.side * displacement >= self.gap))
 
-    def closed_in_words(self, field: Floats) -> str:
-        """Say which one-sided supports count as springs at a displacement field, (numnp, 5)."""
-        one_sided = self.select(self.is_one_sided)
-        opened = int(np.count_nonzero(~one_sided.closed(one_sided.of(field))))
-        count = f"the {len(one_sided.node)} one-sided supports (UNIL)"
-        if opened:
-            return f"{opened} of {count} are open; the closed ones also pull"
-        return f"{count} are all closed, and also pull"
-
     def reactions(self, displacement: Floats) -> Floats:
         """Return the internal force of each support, (n,), at displacements of the dofs, (n,).
 

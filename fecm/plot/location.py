@@ -14,7 +14,6 @@ from matplotlib.ticker import MaxNLocator
 
 from fecm._typing import Floats, Indices
 from fecm.deck.model import Gages
-from fecm.mechanics.mesh import element_blocks
 from fecm.plot import style
 from fecm.plot.kinds import Picture
 from fecm.problem.generate import generate
@@ -88,7 +87,7 @@ def _outline(located: Location) -> Floats:
     """Return the outline of the plate: sides of elements from corner to corner, (n, 2, 2)."""
     mesh = generate(located.deck)
     sides: list[Indices] = []
-    for block in element_blocks(mesh.elements, mesh.coordinates):
+    for block in mesh.families:
         corners = block.nodes[:, : block.shape.corners]
         sides.append(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2))
     ends, times = np.unique(np.sort(np.concatenate(sides), axis=1), axis=0, return_counts=True)

@@ -305,7 +305,7 @@ def _stresses(
         around = None
         if problem.load_place is not None:
             circle = CircleStresses(
-                problem.families,
+                problem.mesh.families,
                 problem.load_place,
                 problem.reach_of_load,
                 zones,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -73,7 +73,7 @@ def load_deck(
     before it is checked; problems may then lack a program. Raises OSError if the file can't be
     read.
     """
-    return deck if isinstance(deck, LoadedDeck) else _load(*_text(deck), mode, change)
+    return _loaded(deck, partial(_load, mode=mode, change=change))
 
 
 def load_again(deck: AnyDeck) -> LoadedDeck:
@@ -81,12 +81,14 @@ def load_again(deck: AnyDeck) -> LoadedDeck:
 
     For jobs that are repeated with one deck, which must not change what they get.
     """
-    return deck if isinstance(deck, LoadedDeck) else _last(*_text(deck))
+    return _loaded(deck, _last)
 
 
-def _text(deck: str | Path | AnyFile | Deck) -> tuple[str, str]:
-    """Return the text of a deck and the name of its source."""
-    return (deck.to_text(), "<deck>") if isinstance(deck, Deck) else load_text(deck)
+def _loaded(deck: AnyDeck, load: Callable[[str, str], LoadedDeck]) -> LoadedDeck:
+    """Load a deck from its text and the name of its source, unless it is loaded."""
+    if isinstance(deck, LoadedDeck):
+        return deck
+    return load(*((deck.to_text(), "<deck>") if isinstance(deck, Deck) else load_text(deck)))
 
 
 @lru_cache(maxsize=1)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.interpolation import W
-from fecm.mechanics.mesh import Ints, MeshArrays, element_blocks, extent
+from fecm.mechanics.mesh import Ints, MeshArrays, extent
 
 # Most nodes whose distances are compared.
 FREE = 3000
@@ -78,7 +78,7 @@ def element_sides(mesh: MeshArrays) -> PlateSides:
     corners, rows, held = [], [], []
     # Node 0 stands for an absent node, which is ignored.
     holds = np.concatenate([[True], mesh.codes[:, W] != 0])
-    for block in element_blocks(mesh.elements, mesh.coordinates):
+    for block in mesh.families:
         count = block.shape.corners
         nodes = mesh.elements[block.rows]
         for side in range(count):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,15 +20,13 @@ from fecm.mechanics.interpolation import W
 from fecm.mechanics.joints import ElementSides, coincident, sides_of
 from fecm.mechanics.laminate import LaminateSection, effective_rigidity, threshold_force
 from fecm.mechanics.mesh import (
-    ElementBlock,
     MeshArrays,
-    element_blocks,
     element_centres,
     extent,
     inner_corners,
     longest_sides,
 )
-from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.ply_stresses import uniform_stresses
 from fecm.mechanics.points import RADIUS_PER_THICKNESS, containing_elements, patch_weights
 from fecm.mechanics.solutions import (
@@ -98,17 +96,9 @@ class Problem:
         return rules(self.deck.require(model.Material))
 
     @cached_property
-    def families(self) -> list[ElementBlock]:
-        """Elements with the same nodes present.
-
-        Raises ValueError if an element lacks a corner.
-        """
-        return element_blocks(self.mesh.elements, self.mesh.coordinates)
-
-    @cached_property
     def sides(self) -> ElementSides:
         """Sides of the elements."""
-        return sides_of(self.families, self.mesh.elements)
+        return sides_of(self.mesh.families, self.mesh.elements)
 
     @cached_property
     def coincident_nodes(self) -> Indices:
@@ -163,7 +153,7 @@ class Problem:
             return 0
         rows = [
             int(family.rows[member])
-            for family in self.families
+            for family in self.mesh.families
             for member in containing_elements(family, np.array([place]))[0].tolist()
         ]
         return self._laminate_numbers[min(rows, default=0)]
@@ -229,6 +219,18 @@ class Problem:
     def critical_time_step(self) -> float:
         """Critical time step of the moving plate, which limits the program."""
         return critical_time_step(self.moving_plate)
+
+    @cached_property
+    def share_of_step(self) -> float:
+        """Critical time step over the one without springs and one-sided supports.
+
+        The share is NaN for a plate that has no critical time step, which the check reports.
+        """
+        try:
+            without = critical_time_step(replace(self.moving_plate, supports=None))
+            return min(1.0, self.critical_time_step / without)
+        except UnsoundPlateError:
+            return math.nan
 
     @cached_property
     def buckling_factor(self) -> float:
@@ -335,7 +337,7 @@ class Problem:
         At such a node the sides of elements whose ends are held in w run in two directions.
         """
         return inner_corners(
-            self.families, self.mesh.coordinates, self.plate.supported.equations[:, W] == 0
+            self.mesh.families, self.mesh.coordinates, self.plate.supported.equations[:, W] == 0
         )
 
     def coarseness(self, elements: Indices) -> float:
@@ -348,7 +350,7 @@ class Problem:
         if self.patch is None:
             return 0.0
         place = np.array([[self.patch.x, self.patch.y]])
-        rows = [block.rows[containing_elements(block, place)[0]] for block in self.families]
+        rows = [block.rows[containing_elements(block, place)[0]] for block in self.mesh.families]
         return float(self._longest_sides[np.concatenate(rows)].max(initial=0.0))
 
     @cached_property

@@ -23,7 +23,7 @@ from fecm.deck.model import (
     Forces,
     Segment,
 )
-from fecm.mechanics.mesh import ElementBlock, Ints, MeshArrays, element_blocks
+from fecm.mechanics.mesh import ElementBlock, Ints, MeshArrays
 
 # Corners at the ends of each side, and the local coordinate that runs along it.
 _SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))
@@ -44,7 +44,7 @@ def refined_deck(deck: Deck, mesh: MeshArrays, marked: Bools | None = None) -> D
     nodes = _Nodes(mesh)
     elements: list[tuple[int, list[int]]] = []
     split = _split_sides(mesh, np.ones(len(mesh.elements), bool) if marked is None else marked)
-    for block in element_blocks(mesh.elements, mesh.coordinates):
+    for block in mesh.families:
         count = block.nodes.shape[1]
         if count not in (4, 9) or block.shape.nodes != 9:
             why = "it does not have four or nine nodes"

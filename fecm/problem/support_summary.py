@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
 from typing import Annotated, TypedDict
 
 import numpy as np
@@ -16,9 +14,7 @@ from fecm._typing import FiniteFloat, Floats
 from fecm.deck.mesh_cards import DOF_NAMES
 from fecm.deck.units import MASS, quantity, unit_of
 from fecm.mechanics.interpolation import W
-from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.solutions import ConvergenceError
-from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.estimates import MOST_SOLVED
 from fecm.problem.problem import Problem
 
@@ -81,10 +77,7 @@ def supports_summary(problem: Problem) -> SupportsSummary | None:
                 "gap": float(lifting.gap.max()),
                 "flexibility_gain": flexibility_gain(problem),
             }
-        step_ratio = math.nan
-        with suppress(UnsoundPlateError):  # the check reports it if the program takes steps
-            alone = critical_time_step(replace(plate, supports=None))
-            step_ratio = min(1.0, problem.critical_time_step / alone)
+        step_ratio = problem.share_of_step
     return {
         "springs": springs,
         "one_sided": one_sided,

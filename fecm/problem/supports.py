@@ -26,7 +26,7 @@ from fecm.deck.findings import Findings
 from fecm.deck.model import Deck, NodeValues, OneSidedSupport, OneSidedSupports, Springs
 from fecm.mechanics.interpolation import NDOF, W
 from fecm.mechanics.joints import sides_of
-from fecm.mechanics.mesh import MeshArrays, element_blocks, extent
+from fecm.mechanics.mesh import MeshArrays, extent
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.supports import NodeSupports, one_sided, side_weights
 from fecm.mechanics.symmetry import half_turn_images
@@ -81,7 +81,7 @@ def line_weights(mesh: MeshArrays, first: int, last: int) -> tuple[Indices, Floa
     offset = places - start
     position, distance = offset @ along, np.abs(offset[:, 0] * along[1] - offset[:, 1] * along[0])
     on_line = (distance <= near) & (position >= -near) & (position <= length + near)
-    sides = sides_of(element_blocks(mesh.elements, mesh.coordinates), mesh.elements)
+    sides = sides_of(mesh.families, mesh.elements)
     ends, middle = sides.ends, sides.between[:, 0]
     keys = np.column_stack([np.sort(ends, axis=1), middle])[on_line[ends].all(axis=1)]
     keys = np.unique(keys, axis=0)  # two elements share a side
@@ -185,3 +185,13 @@ def default_stiffness(plate: PlateModel, safe_step: float) -> Floats:
     """
     mass = plate.field(plate.mass, 0.0)[:, W]
     return np.asarray(DEFAULT_SHARE * 4.0 * mass / safe_step**2)
+
+
+def closed_in_words(supports: NodeSupports, field: Floats) -> str:
+    """Say which one-sided supports count as springs at a displacement field, (numnp, 5)."""
+    rows = supports.select(supports.is_one_sided)
+    opened = int(np.count_nonzero(~rows.closed(rows.of(field))))
+    count = f"the {len(rows.node)} one-sided supports (UNIL)"
+    if opened:
+        return f"{opened} of {count} are open; the closed ones also pull"
+    return f"{count} are all closed, and also pull"

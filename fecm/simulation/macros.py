@@ -20,6 +20,7 @@ from fecm.mechanics.solutions import ConvergenceError, modes, reactions
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.strains import strains_and_resultants
 from fecm.mechanics.time_step import critical_time_step, taken_time_step
+from fecm.problem.supports import closed_in_words
 from fecm.simulation.decision import steps_to_come
 from fecm.simulation.interpreter import Action, EndedError, Passes
 from fecm.simulation.recorder import Steps, Times
@@ -241,8 +242,8 @@ def find_modes(run: Simulation, n: int) -> None:
     state, plate = run.state, run.model.plate
     about = None if plate.is_linear else run.displacement_field()
     if plate.supports is not None and plate.lifts:
-        closed = plate.supports.closed_in_words(run.displacement_field())
-        state.notes.append(f"EIGE: {closed}")
+        words = closed_in_words(plate.supports, run.displacement_field())
+        state.notes.append(f"EIGE: {words}")
     natural_modes = modes(plate, n, consistent=state.consistent_mass, field=about)
     pairs = zip(natural_modes.angular_frequency, natural_modes.shapes, strict=True)
     for mode, (omega, shape) in enumerate(pairs, start=1):

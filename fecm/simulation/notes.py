@@ -349,8 +349,8 @@ def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
 def _band_without_pull(problem: Problem, result: Result, held: float) -> str:
     """Say how much softer a plate is whose supports only push, and what that does to the impact.
 
-    The peaks, and the energies at the delamination threshold, have the ratio of those of the impact
-    on the static plate; the run has the value of the plate whose supports pull.
+    The run has the peak and the energy at the delamination threshold of the plate whose supports
+    pull. The ratio of both plates is computed for the impact on the static plate.
     `held` is the compliance of the plate whose supports pull as well.
     """
     pushed = pushing_compliance(problem)

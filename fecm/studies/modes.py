@@ -27,6 +27,7 @@ from fecm.mechanics.symmetry import restrain_resting_dofs
 from fecm.problem.build import RunOptions
 from fecm.problem.loading import AnyDeck, load_deck, sole
 from fecm.problem.problem import Problem
+from fecm.problem.supports import closed_in_words
 from fecm.problem.symmetry import symmetry_lines
 from fecm.results.modes import frequencies_of, is_in_plane
 from fecm.results.result import Result
@@ -63,12 +64,17 @@ class ModeJson(TypedDict):
     ]
 
 
-class ModesJson(TypedDict):
-    """Natural modes of a deck in JSON."""
+class FrequenciesJson(TypedDict):
+    """What natural modes and a fit to them have in common in JSON."""
 
     title: str
     units: Annotated[dict[str, str], "Names of the units; empty if the deck names none."]
     frequency_unit: Annotated[str, "Hz if the deck's unit of time is known."]
+
+
+class ModesJson(FrequenciesJson):
+    """Natural modes of a deck in JSON."""
+
     modes: list[ModeJson]
     notes: list[str]
 
@@ -342,4 +348,4 @@ def _notes(problem: Problem) -> Iterator[str]:
             "one part of a plate, only the modes that are symmetric about them are found"
         )
     if plate.supports is not None and plate.lifts:
-        yield plate.supports.closed_in_words(np.zeros(plate.mesh.equations.shape))
+        yield closed_in_words(plate.supports, np.zeros(plate.mesh.equations.shape))

@@ -53,7 +53,7 @@ def gage_off_the_plate(problem: Problem) -> Reports:
     """
     for record in problem.deck.require(model.Gages).records:
         point = np.array([[record.x, record.y]])
-        if not any(len(containing_elements(family, point)[0]) for family in problem.families):
+        if not any(len(containing_elements(family, point)[0]) for family in problem.mesh.families):
             message = f"Gage {record.number} at ({record.x:g}, {record.y:g}) is not on the plate."
             yield Report(message, record.place("gage's x"))
 

@@ -218,7 +218,7 @@ def side_node_off_place(problem: Problem) -> Reports:
     """
     mesh = problem.mesh
     wrong: list[int] = []
-    for family in problem.families:
+    for family in problem.mesh.families:
         if family.shape is TRIANGLE:
             continue
         thirds = family.shape is CUBIC

@@ -76,7 +76,7 @@ def elements_without_membrane(problem: Problem) -> Reports:
 def not_nine_nodes(problem: Problem) -> Bools:
     """Return a mask of the elements that are not quadrilaterals with 9 nodes, (numel,)."""
     wrong = np.zeros(len(problem.mesh.elements), dtype=bool)
-    for family in problem.families:
+    for family in problem.mesh.families:
         nine = family.shape is QUADRILATERAL and family.nodes.shape[1] == QUADRILATERAL.nodes
         wrong[family.rows] = not nine
     return wrong

@@ -107,7 +107,7 @@ def _held(problem: Problem, patch: ContactPatch) -> str:
     near = np.hypot(*(mesh.coordinates - centre).T) <= patch.radius
     if (held & near).any():
         return f"node {np.argmax(held & near) + 1}"
-    for family in problem.families:
+    for family in problem.mesh.families:
         local = np.stack([family.shape.xi, family.shape.eta], axis=1)[family.present]
         for a in range(family.shape.corners):
             b = (a + 1) % family.shape.corners

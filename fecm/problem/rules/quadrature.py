@@ -33,7 +33,7 @@ def strains_at_nodes_of_triangles(problem: Problem) -> Reports:
     Remedy: Take Gauss points: a positive K.
     """
     card = problem.deck.require(model.Material).integration
-    for family in problem.families:
+    for family in problem.mesh.families:
         if _has_singular_points(problem, family):
             what = f"Strains at nodal points (K = {card.points}) do not exist in triangles"
             where = f"at the third node: {describe_elements(family.rows)}"
@@ -58,7 +58,7 @@ def folded_elements(problem: Problem) -> Reports:
     """
     bending, shear, strains = problem.rules
     folded: dict[str, list[int]] = {}  # rows by the hint about the numbering
-    for family in problem.families:
+    for family in problem.mesh.families:
         used = {bending, shear}
         if not _has_singular_points(problem, family):
             used.add(strains)
@@ -81,7 +81,7 @@ def nodes_without_mass(problem: Problem) -> Reports:
     Remedy: Take L1 = 2 or more for elements with mid-side nodes.
     """
     massless: list[np.ndarray[tuple[int], np.dtype[np.intp]]] = []
-    for family in problem.families:
+    for family in problem.mesh.families:
         values, _ = interpolation.local_shape_functions(family, problem.rules[0])
         if (np.square(values).sum(axis=0) < NO_MASS).any():
             massless.append(family.rows)
@@ -142,7 +142,7 @@ def _checkerboards(problem: Problem) -> Iterator[str]:
     if "RODP" not in words and (_is_supported(problem) or "EXCD" not in words or not few):
         return
     card = problem.deck.require(model.Material).integration
-    for family in problem.families:
+    for family in problem.mesh.families:
         if _orders(family) is NINE_NODES and _only_supports_resist(problem):
             what = f"Under the shear order L2 = {card.shear} a force on single nodes excites"
             yield f"{what} a checkerboard motion of the 9-node elements, which"
@@ -164,7 +164,7 @@ def locking(problem: Problem) -> Reports:
     if _shear_order(problem) < FOUR_NODES.free:
         return
     card = problem.deck.require(model.Material).integration
-    if any(_orders(family) is FOUR_NODES for family in problem.families):
+    if any(_orders(family) is FOUR_NODES for family in problem.mesh.families):
         why = "they are much too stiff in a thin plate"
         message = f"4-node elements lock under the shear order L2 = {card.shear}: {why}."
         hint = "use L2 = 1 and support the plate, or elements with mid-side nodes"
@@ -211,7 +211,7 @@ def motions_without_energy(problem: Problem) -> Reports:
     order, supported = _shear_order(problem), _is_supported(problem)
     excited = any(_checkerboards(problem))
     weak: dict[int, list[str]] = {}
-    for family in problem.families:
+    for family in problem.mesh.families:
         needed = _orders(family)
         if needed is NINE_NODES and excited:
             continue
@@ -233,7 +233,7 @@ def elements_without_assumed_shear(problem: Problem) -> Reports:
     Remedy: Take other elements, or SHEA without MITC.
     """
     wrong = np.zeros(len(problem.mesh.elements), dtype=bool)
-    for family in problem.families:
+    for family in problem.mesh.families:
         wrong[family.rows] = not assumed_shear.uses_assumed_shear(family)
     what = "has no assumed shear strains (SHEA MITC)"
     hint = "quadrilaterals with 4 or 9 nodes have them; without MITC any element will do"
