@@ -29,13 +29,13 @@ from fecm.mechanics.solutions import ConvergenceError, Tangent
 from fecm.mechanics.symmetry import symmetry_reduction
 
 # The iterations end at this change, relative to the displacement: force and work have its square.
-CLOSE = 1.0e-5
+CLOSE = 1.0e-7
 MOST_ITERATIONS = 30
 # The iterations fail beyond this relative change.  The first change is the whole displacement.
 MOST_CHANGE = 2.0
 # Conjugate gradients end at this residual, relative to the load: the compliance has its square.
 # A tangent that needs more products is factorised anew.
-CLOSE_DIRECTION = 1.0e-4
+CLOSE_DIRECTION = 1.0e-5
 MOST_PRODUCTS = 15
 DIFFERENCE = 1.0e-4  # of two displacements whose forces give a product, relative to them
 MOST_STEPS = 200

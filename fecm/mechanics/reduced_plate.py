@@ -89,7 +89,7 @@ MEMBRANE_MODES, MEMBRANE_SHARE, MEMBRANE_FASTEST = 6, 0.01, 1.5
 # Error of B' B in the displacement that the stretching takes from a static one under the load,
 # relative to the largest.  It is the largest error of deflections whose modes scatter about the
 # static ones, by a share of each, and that reach from a part of the largest.
-STRETCHING = 1e-5
+STRETCHING = 1e-6
 SCATTER, SMALLEST, DEFLECTIONS = 0.5, 0.2, 200
 
 
