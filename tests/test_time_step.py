@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +18,6 @@ from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.time_step import (
     critical_time_step,
     eigenvalue_bounds,
-    rounded_time_step,
     safe_time_step,
     taken_time_step,
 )
@@ -177,26 +175,6 @@ def test_the_steps_to_the_critical_one_do_not_grow_with_the_plate(
     matrix = (scale @ model.stiffness @ scale).tocsc()
     (largest,) = eigsh(matrix, 1, sigma=above, return_eigenvectors=False)
     assert 0.0 <= critical * np.sqrt(largest) / 2.0 - 1.0 < 5e-4
-
-
-def test_a_rounded_critical_step_is_the_one_rounded_later_after_fewer_products(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    steps: list[float] = []
-    orthogonalise = time_step._orthogonalise
-
-    def counted(*arguments: Any) -> tuple[float, float]:
-        steps.append(1.0)
-        return orthogonalise(*arguments)
-
-    monkeypatch.setattr(time_step, "_orthogonalise", counted)
-    plates = [slender(600), *(MODELS[name] for name in ("4 nodes", "tension", "curved"))]
-    for model in plates:
-        exact = rounded_time_step(critical_time_step(model))
-        assert rounded_time_step(critical_time_step(model, rounded=rounded_time_step)) == exact
-    steps.clear()
-    critical_time_step(plates[0], rounded=rounded_time_step)
-    assert 0 < len(steps) <= 60
 
 
 @pytest.mark.skipif(kernels.LIBRARY is None, reason="the kernels are not compiled")

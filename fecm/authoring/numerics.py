@@ -76,8 +76,7 @@ def chosen_time_step(options: ImpactOptions, deck: Deck) -> float:
     if not mesh.number_of_equations:
         return 1.0  # the deck is refused later
     try:
-        plate = build_plate(deck, mesh)
-        return rounded_time_step(critical_time_step(plate, rounded=rounded_time_step))
+        return rounded_time_step(critical_time_step(build_plate(deck, mesh)))
     except UnsoundPlateError:
         if load_deck(replace(deck, macros=impact_program(options, deck, 1.0, 1.0))).errors():
             return 1.0  # the deck is refused later

@@ -269,7 +269,6 @@ TOLERANCE = 1.0e-4
 # Tolerance after PATIENCE steps.  The highest frequencies of a large plate of equal elements are
 # close together, so that the number of steps to TOLERANCE grows with the plate's size.
 RELAXED = 1.0e-3
-ROUGH = 3.0e-3  # of an eigenvalue whose time step is rounded to two digits
 PATIENCE = 100
 PART = 32  # number of elements whose highest frequencies are computed at once
 FEW = 20  # fewer equations are solved as a dense problem
@@ -346,19 +345,13 @@ def rounded_time_step(critical: float) -> float:
     return float(f"{math.floor(limit / unit) * unit:.1e}")
 
 
-def critical_time_step(
-    model: PlateModel,
-    spring: tuple[Floats, float] | None = None,
-    rounded: Callable[[float], float] | None = None,
-) -> float:
+def critical_time_step(model: PlateModel, spring: tuple[Floats, float] | None = None) -> float:
     """Return the critical time step of the central differences.
 
     The largest frequency is found by Lanczos iteration without assembling the stiffness.  The
     relative error is at most 5e-5, or 5e-4 if 100 steps do not suffice; the result is then too
     large rather than too small.  A spring to ground is a pair of weights, (neq,), and a stiffness
-    (force/length).  If only a `rounded` result is needed, the error may be larger, up to 1.5e-3,
-    where it does not change what is rounded.  Raises UnsoundPlateError if the stiffness is not
-    finite or the iteration fails.
+    (force/length).  Raises UnsoundPlateError if the stiffness is not finite or the iteration fails.
     """
     with np.errstate(all="ignore"):
         plate_alone, mass, places = _accelerations(model)
@@ -373,7 +366,7 @@ def critical_time_step(
             raise UnsoundPlateError(BEYOND)
         if model.neq < FEW:
             return 2.0 / math.sqrt(_largest_of_few(product, scale, places, len(mass)))
-        return 2.0 / math.sqrt(_largest_eigenvalue(product, mass, start, rounded))
+        return 2.0 / math.sqrt(_largest_eigenvalue(product, mass, start))
 
 
 def _accelerations(model: PlateModel) -> tuple[Callable[[Floats], Floats], Floats, Indices]:
@@ -422,12 +415,7 @@ def _largest_of_few(
     return float(np.linalg.eigvalsh(np.column_stack(columns))[-1])
 
 
-def _largest_eigenvalue(
-    product: Callable[[Floats], Floats],
-    mass: Floats,
-    start: Floats,
-    rounded: Callable[[float], float] | None = None,
-) -> float:
+def _largest_eigenvalue(product: Callable[[Floats], Floats], mass: Floats, start: Floats) -> float:
     """Find the largest eigenvalue of M^-1 K by Lanczos iteration in the inner product of M."""
     # Without reorthogonalisation, converged eigenvalues are only repeated.
     last, before, beta = start / math.sqrt(float((mass * start * start).sum())), 0.0 * start, 0.0
@@ -441,21 +429,13 @@ def _largest_eigenvalue(
         if step % 10 == 0 or beta <= TOLERANCE**2 * alpha:
             matrix = np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1)
             values, vectors = np.linalg.eigh(matrix)
-            value, error = float(values[-1]), beta * float(abs(vectors[-1, -1]))
             allowed = TOLERANCE if step < PATIENCE else RELAXED
-            if rounded is not None and _is_same(rounded, value, value + error):
-                allowed = ROUGH
-            if error <= allowed * value:
-                return value
+            if beta * abs(vectors[-1, -1]) <= allowed * values[-1]:
+                return float(values[-1])
         beside.append(beta)
         before /= beta
         last, before = before, last
     raise UnsoundPlateError(f"no largest frequency was found in {MOST_STEPS} steps")
-
-
-def _is_same(rounded: Callable[[float], float], *eigenvalues: float) -> bool:
-    """Return whether the time steps of eigenvalues are the same once rounded."""
-    return len({rounded(2.0 / math.sqrt(value)) for value in eigenvalues}) == 1
 
 
 def _orthogonalise(
