@@ -6,6 +6,7 @@ summary begins with the line that answers; its rows follow in groups.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, auto
@@ -25,6 +26,7 @@ Row: TypeAlias = tuple[Cell, ...]  # an empty label continues the row before
 LABEL_WIDTH = 18  # of the labels in a terminal
 INDENT = "  "  # of the rows of a group
 LEAST_COLUMNS = 20  # of wrapped lines
+LABEL = re.compile(r"\s*\S+(?: \S+)*  +(?=\S)")  # of a value on the same line
 
 
 @dataclass(frozen=True)
@@ -107,24 +109,45 @@ class Line(NamedTuple):
 
 def summary_lines(summary: Summary, columns: int | None = None) -> Iterator[Line]:
     """Yield title, answer, and each group after a blank line; `columns` is the longest line."""
-    yield Line(summary.title, Part.TITLE)
+    yield from (Line(text, Part.TITLE) for text in wrapped(summary.title, columns))
     yield from (Line(text, Part.ANSWER) for text in wrapped(summary.answer, columns))
     for group in summary.groups:
         if group.rows:
             yield Line("", Part.ROW)
-            yield Line(group.title, Part.HEADING)
+            yield from (Line(text, Part.HEADING) for text in wrapped(group.title, columns))
             lines = text_lines(group, columns=None if columns is None else columns - len(INDENT))
             yield from (Line(f"{INDENT}{text}".rstrip(), Part.ROW) for text in lines)
 
 
-def wrapped(text: str, columns: int | None) -> list[str]:
+def wrapped(text: str, columns: int | None, indent: int = 0) -> list[str]:
     """Return the lines of a text that are not longer than some columns, except for long words."""
     if columns is None or len(text) <= columns:
         return [text]
     from textwrap import wrap  # only for terminals
 
-    columns = max(columns, LEAST_COLUMNS)
-    return wrap(text, columns, break_long_words=False, break_on_hyphens=False)
+    return wrap(
+        text,
+        max(columns, LEAST_COLUMNS),
+        subsequent_indent=" " * indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def hanging(text: str, columns: int | None) -> list[str]:
+    """Return the lines of a text; those after the first begin under the value of a label.
+
+    Examples
+    --------
+    >>> hanging("  peak force  86.2 lb at 1.2 ms", 22)
+    ['  peak force  86.2 lb', '              at 1.2', '              ms']
+    >>> hanging("note: the plate is thin", 20)
+    ['note: the plate is', '  thin']
+    """
+    indent = len(text) - len(text.lstrip()) + len(INDENT)
+    if columns is not None and (label := LABEL.match(text)) and label.end() < 2 * columns // 3:
+        indent = label.end()
+    return wrapped(text, columns, indent)
 
 
 def label_lines(
@@ -150,12 +173,40 @@ def label_lines(
 
 
 def text_lines(table: Table, width: int = LABEL_WIDTH, columns: int | None = None) -> list[str]:
-    """Return the lines of a table without its title, for a terminal."""
+    """Return the lines of a table without its title, for a terminal.
+
+    A table that is wider than `columns` is printed in parts; each has the first column.
+    """
     if not table.header:
         return label_lines(table.rows, width, columns)
     columns_of = zip(*table.rows, strict=True)
     are_numbers = [not any(isinstance(cell, str) and cell for cell in c) for c in columns_of]
-    return aligned([table.header, *(tuple(map(_text, row)) for row in table.rows)], are_numbers)
+    rows = [table.header, *(tuple(map(_text, row)) for row in table.rows)]
+    lines: list[str] = []
+    for part in _parts(rows, columns):
+        cells = [[row[number] for number in part] for row in rows]
+        lines += aligned(cells, [are_numbers[number] for number in part])
+    return lines
+
+
+def titled_lines(*tables: Table, width: int = LABEL_WIDTH, columns: int | None = None) -> list[str]:
+    """Return the title of the first table, and the lines of all tables under it."""
+    room = None if columns is None else columns - len(INDENT)
+    lines = [line for table in tables for line in text_lines(table, width, room)]
+    return [tables[0].title, *(f"{INDENT}{line}" for line in lines)]
+
+
+def _parts(rows: Sequence[Sequence[str]], columns: int | None) -> Iterator[list[int]]:
+    """Yield the numbers of the table's columns that fit beside the first, part by part."""
+    first, *widths = (max(map(len, column)) for column in zip(*rows, strict=True))
+    part, width = [0], first
+    for number, more in enumerate(widths, 1):
+        if columns is not None and len(part) > 1 and width + 2 + more > columns:
+            yield part
+            part, width = [0], first
+        part.append(number)
+        width += 2 + more
+    yield part
 
 
 def aligned(rows: Sequence[Sequence[str]], to_the_right: Sequence[bool] = ()) -> list[str]:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import io
 import json
+import os
 import re
 import shutil
+import struct
 import subprocess
 from pathlib import Path
 
 import pytest
 
 import fecm
-from fecm._table import Part, Summary, Table, summary_lines
-from fecm.results.summary import summary_of_run
+from fecm._table import Part, Summary, Table, summary_lines, text_lines
+from fecm.cli.terminal import terminal
+from fecm.deck.findings import CardPlace, Finding
 from tests.calls import call
 from tests.decks import small
 from tests.schemas import text_of
@@ -81,15 +85,65 @@ def test_the_choice_of_a_call_does_not_last() -> None:
 # Width -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("columns", [60, 80, 120])
+@pytest.mark.parametrize("columns", [60, 100])
 @pytest.mark.few(1)
-def test_lines_of_a_summary_are_not_longer_than_the_terminal_and_lose_no_word(columns: int) -> None:
-    result = fecm.run_one(fecm.examples.path("drop-weight"))
-    summary = summary_of_run(result)
-    lines = [line.text for line in summary_lines(summary, columns)]
-    assert max(map(len, lines)) <= columns
-    words = " ".join(lines).split()
-    assert words == " ".join(line.text for line in summary_lines(summary)).split()
+def test_lines_on_a_terminal_are_not_longer_than_it_and_lose_no_word(
+    columns: int, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments = ("d.inp", "--mode", "listing")  # with notes and a warning about a card
+    commands = [("check", *arguments), ("run", *arguments, "--overwrite"), ("info", "d.h5")]
+    piped = [call(*command, cwd=folder, is_mixed=True).stdout for command in commands]
+    answers = [call(*command, "--format", "json", cwd=folder).stdout for command in commands]
+    monkeypatch.setattr(terminal, "columns", lambda stream: columns)
+    for command, text, answer in zip(commands, piped, answers, strict=True):
+        shown = call(*command, cwd=folder, is_mixed=True).stdout
+        assert max(map(len, shown.splitlines())) <= columns < max(map(len, text.splitlines()))
+        assert shown.split() == text.split()
+        assert call(*command, "--format", "json", cwd=folder).stdout == answer
+
+
+@pytest.mark.posix
+def test_the_width_is_that_of_the_terminal_unless_columns_says_otherwise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    import fcntl  # Unix only, as are the others
+    import pty
+    import termios
+
+    monkeypatch.delenv("COLUMNS", raising=False)
+    parent, child = pty.openpty()
+    with os.fdopen(child, "w") as stream, os.fdopen(parent, "rb"):
+        assert terminal.columns(stream) is None  # not known
+        fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 63, 0, 0))
+        assert terminal.columns(stream) == 63
+        monkeypatch.setenv("COLUMNS", "47")
+        assert terminal.columns(stream) == 47
+    assert terminal.columns(io.StringIO()) is None
+
+
+def test_a_wide_table_is_printed_in_parts_that_begin_with_its_first_column() -> None:
+    table = Table((("a", "one", "two"), ("b", "three", "four")), ("name", "first", "second"))
+    assert text_lines(table) == [
+        "name  first  second",
+        "a     one    two",
+        "b     three  four",
+    ]
+    assert text_lines(table, columns=15) == [
+        "name  first",
+        "a     one",
+        "b     three",
+        "name  second",
+        "a     two",
+        "b     four",
+    ]
+
+
+def test_of_a_card_beyond_the_terminal_the_part_around_the_field_is_shown() -> None:
+    card = f"{'A' * 60} wrong {'B' * 60}"
+    finding = Finding("E101", "Not a number.", CardPlace(7, 62, 66, card, "x1"))
+    *_, shown, caret = finding.render("d.inp", 60).splitlines()
+    assert len(shown) <= 60
+    assert shown[caret.index("^") : caret.rindex("^") + 1] == "wrong"
 
 
 def test_a_group_without_rows_has_no_heading() -> None:

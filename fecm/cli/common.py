@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import contextlib
 import re
-import shutil
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from fecm._errors import FecmError
 from fecm._files import open_for_writing
-from fecm._table import Part, Summary, summary_lines
+from fecm._table import Part, Summary, hanging, summary_lines
 from fecm._text import jsonable, printable
 from fecm._watch import MINUTE, Watch
 from fecm.cli.interrupts import signals
 from fecm.cli.terminal import terminal, with_colored_head
+
+if TYPE_CHECKING:
+    from fecm.deck.findings import Finding
 
 # Exit statuses.
 FAILED = 1  # a check
@@ -32,6 +34,7 @@ NAMED_IN_MESSAGES = (
     "build|cases|columns|correlation|deck|design|exceed|full|measure|model|modes|random|refine|"
     "samples|scheduler|seed|sensitivity|units|until|vary"
 )
+WIDEST_BAR, AROUND_BAR = 36, 46  # characters of a progress bar, and of its texts
 LONGEST = 1000  # characters of a line of standard error
 # Styles of the lines of a summary on a terminal.
 STYLES: dict[Part, dict[str, Any]] = {Part.ANSWER: {"bold": True}, Part.HEADING: {"fg": "cyan"}}
@@ -48,17 +51,21 @@ class CheckFailedError(FecmError):
     exit_code = FAILED
 
 
-def echo(text: object = "", *, err: bool = False, **style: Any) -> None:
+def echo(text: object = "", *, err: bool = False, whole: bool = False, **style: Any) -> None:
     """Print lines to the terminal, with control characters escaped.
 
-    A line of standard error that is longer than LONGEST loses its middle. An error of standard
-    output does not end the command; the exit status reports it. `style` has arguments of
-    :func:`click.style`.
+    Lines are wrapped to the width of a terminal, unless they are to stay `whole`. A line of
+    standard error that is longer than LONGEST loses its middle. An error of standard output does
+    not end the command; the exit status reports it. `style` has arguments of :func:`click.style`.
     """
+    stream = sys.stderr if err else sys.stdout
     lines = [printable(line) for line in str(text).split("\n")]
     if err:
         lines = [_shortened(line) for line in lines]
-    color = terminal.uses_color(sys.stderr if err else sys.stdout)
+    if not whole:
+        columns = terminal.columns(stream)
+        lines = [part for line in lines for part in hanging(line, columns)]
+    color = terminal.uses_color(stream)
     if color and err:
         lines = [with_colored_head(line) for line in lines]
     shown = "\n".join(lines)
@@ -71,9 +78,20 @@ def echo_summary(summary: Summary) -> None:
 
     A command that writes a result file does not call it if the user wants quiet.
     """
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    for line in summary_lines(summary, width):
+    for line in summary_lines(summary, terminal.columns(sys.stdout)):
         echo(printable(line.text), **STYLES.get(line.part, {}))
+
+
+def echo_lines(lines: Callable[[int | None], Iterable[str]]) -> None:
+    """Print lines that a function gives for the width of the terminal."""
+    echo("\n".join(lines(terminal.columns(sys.stdout))))
+
+
+def echo_findings(findings: Iterable[Finding], source: str, *, err: bool = True) -> None:
+    """Print findings of a deck; `source` is the name of its file."""
+    columns = terminal.columns(sys.stderr if err else sys.stdout)
+    for finding in findings:
+        echo(finding.render(source, columns), err=err, whole=True)
 
 
 def _shortened(line: str) -> str:
@@ -84,7 +102,7 @@ def _shortened(line: str) -> str:
 
 def echo_path(path: object, label: str = "") -> None:
     """Print the name of a file in one line, after a label."""
-    echo(label + printable(str(path)))
+    echo(label + printable(str(path)), whole=True)
 
 
 def echo_json(value: object) -> None:
@@ -195,8 +213,13 @@ def progress(
         with every_minute(line):
             yield advance
         return
+    room = terminal.columns(sys.stderr) or WIDEST_BAR + AROUND_BAR
     with click.progressbar(
-        length=length, label=label, file=sys.stderr, item_show_func=remark
+        length=length,
+        label=label,
+        file=sys.stderr,
+        item_show_func=remark,
+        width=max(1, min(WIDEST_BAR, room - AROUND_BAR)),
     ) as bar:
         yield bar.update
 
@@ -235,6 +258,6 @@ def write_text(path: Path, text: str, *, overwrite: bool) -> None:
         with open_for_writing(path, overwrite=overwrite) as file:
             file.write(text)
     elif sys.stdout.isatty():
-        echo(text.removesuffix("\n"))
+        echo(text.removesuffix("\n"), whole=True)
     else:
         click.echo(text, nl=False)

@@ -25,7 +25,9 @@ from fecm.cli.common import (
     CheckFailedError,
     RefusedError,
     echo,
+    echo_findings,
     echo_json,
+    echo_lines,
     note,
     progress,
     write_text,
@@ -65,8 +67,7 @@ def load_valid(
     """
     loaded = load_deck(deck, mode)
     errors = loaded.errors(force)
-    for finding in loaded.findings if warnings else errors:
-        echo(finding.render(loaded.source), err=True)
+    echo_findings(loaded.findings if warnings else errors, loaded.source)
     if errors:
         raise RefusedError(count_findings(errors) + otherwise)
     return loaded.problems
@@ -78,7 +79,7 @@ def refusing_errors(otherwise: str = "") -> Iterator[None]:
     try:
         yield
     except DeckError as error:
-        echo(error, err=True)
+        echo_findings(error.findings, error.source)
         errors = [finding for finding in error.findings if finding.severity == "error"]
         raise RefusedError(count_findings(errors) + otherwise) from None
 
@@ -170,12 +171,12 @@ def _print(prepared: LoadedDeck, form: Format, *, brief: bool, passes: bool) -> 
     if form is Format.JSON:
         for values in check_loaded(prepared).to_dicts():
             echo_json(values)
-    elif form is Format.TEXT and not brief:
-        echo(check_loaded(prepared))
     elif form is Format.TEXT:
-        for finding in prepared.findings:
-            echo(finding.render(prepared.source))
-        if passes:
+        echo_findings(prepared.findings, prepared.source, err=False)
+        if not brief:
+            for problem in check_loaded(prepared).problems:
+                echo_lines(problem.lines)
+        elif passes:
             counts = Counter(finding.severity for finding in prepared.findings)
             counted = [f"{n} {word}{'s' * (n != 1)}" for word, n in counts.items()]
             echo(f"{printable(prepared.source)}: {', '.join(counted) or 'no findings'}")
@@ -331,7 +332,7 @@ def fmt_command(
         try:
             after = format_deck(before, source)
         except DeckError as error:
-            echo(error, err=True)
+            echo_findings(error.findings, error.source)
             name = f"{source}: " if len(decks) > 1 else ""
             raise RefusedError(f"{name}the deck can't be read; nothing was written") from None
         if only_check:

@@ -13,7 +13,7 @@ from click import option
 
 from fecm._inputs import parsed_toml
 from fecm._text import printable
-from fecm.cli.common import FAILED, echo_json
+from fecm.cli.common import FAILED, echo, echo_json
 from fecm.cli.isolation import reads
 from fecm.cli.options import (
     FORMAT_OPTION,
@@ -189,9 +189,9 @@ def diff_command(options: DiffOptions) -> None:
     if options.form is Format.JSON:
         echo_json(difference.to_dict(same=not options.brief))
     elif options.brief:
-        click.echo("\n".join([*map(printable, difference.different), difference.verdict]))
+        echo("\n".join([*map(printable, difference.different), difference.verdict]))
     else:
-        click.echo("\n".join(difference.lines()))
+        echo("\n".join(difference.lines()))
     if not difference.same:
         raise SystemExit(FAILED)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from fecm.cli.common import echo, echo_json, note
+from fecm.cli.common import echo_json, echo_lines, note
 from fecm.cli.decks import load_single
 from fecm.cli.options import DECK_PATH, FORMAT_OPTION, Format, typical
 from fecm.sweeps.estimate import estimate_problem
@@ -34,4 +34,4 @@ def estimate_command(deck: Path, form: Format) -> None:
     if form is Format.JSON:
         echo_json(estimate.to_dict())
     else:
-        echo(estimate)
+        echo_lines(estimate.lines)

@@ -127,7 +127,7 @@ def identify_command(
         echo_json(fit.to_dict())
     else:
         echo_summary(summary_of_fit(fit))
-        echo(f"\n{fit.cards()}")
+        echo(f"\n{fit.cards()}", whole=True)
     note(*fit.notes)
     if not fit.accepted:
         raise SystemExit(FAILED)

@@ -14,7 +14,7 @@ from click import option
 
 from fecm._errors import StudyError
 from fecm._typing import Floats
-from fecm.cli.common import RefusedError, echo, note
+from fecm.cli.common import RefusedError, echo, echo_findings, note
 from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options
 from fecm.cli.options import (
     DECK_PATH,
@@ -143,7 +143,7 @@ def fit_command(options: FitOptions) -> None:
     if options.form is Format.JSON:
         click.echo(json.dumps({"file": str(test), **fit.to_dict()}))
     else:
-        click.echo(fit)
+        echo(fit)
 
 
 def _law(deck: Path) -> tuple[Deck, Indentation]:
@@ -153,8 +153,7 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
     laws = [(deck, law) for deck in decks if (law := deck.last(Indentation)) is not None]
     if laws:
         check_segment(laws[0][1], reader.findings)
-    for finding in reader.findings:
-        echo(finding.render(str(deck)), err=True)
+    echo_findings(reader.findings, str(deck))
     if reader.findings.errors:
         raise RefusedError(f"{deck} has errors")
     if not laws:
@@ -509,9 +508,9 @@ def estimate_k_command(
     modulus = indentation_modulus(stiffness)
     k, by_e2 = sphere.coefficient(modulus), sphere.coefficient(constants.e2)
     if form is Format.TEXT:
-        click.echo(f"modulus M   {modulus:.6g}")
-        click.echo(f"k by M      {k:.6g}")
-        click.echo(f"k by E2     {by_e2:.6g}")
+        echo(f"modulus M   {modulus:.6g}")
+        echo(f"k by M      {k:.6g}")
+        echo(f"k by E2     {by_e2:.6g}")
     card.print(k, form, modulus=modulus, k_by_e2=by_e2)
 
 
@@ -540,12 +539,12 @@ def contacts_command(name: str | None, units: str, form: Format) -> None:
             about = {"units": units, "source": contact.source, "card": law.text()}
             click.echo(json.dumps({"name": contact.name, **values, **about}))
         elif name:
-            click.echo(law.text())
+            echo(law.text())
         else:
             critical = "alpha_cr" if law.word else "alpha_p"
             line = "" if law.word else f", s_p {law.s_p:g}"
-            click.echo(f"{contact.name} ({units})")
-            click.echo(f"  k {law.k:g}, {critical} {law.alpha_p:g}{line}, q {law.q:g}")
-            click.echo(f"  {contact.source}")
+            echo(f"{contact.name} ({units})")
+            echo(f"  k {law.k:g}, {critical} {law.alpha_p:g}{line}, q {law.q:g}")
+            echo(f"  {contact.source}")
     if name is None and form is Format.TEXT:
-        click.echo(f"\n{RATE}")
+        echo(f"\n{RATE}")

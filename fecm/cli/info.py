@@ -17,7 +17,7 @@ from fecm._machine import available_processors
 from fecm._table import Summary, aligned
 from fecm._text import printable, short_text
 from fecm._version import __version__
-from fecm.cli.common import echo_json
+from fecm.cli.common import echo, echo_json
 from fecm.cli.isolation import reads
 from fecm.cli.options import FORMAT_OPTION, NAMED_PATH, Format, typical
 from fecm.deck.units import declared_units
@@ -85,7 +85,7 @@ def info_command(result: Path, form: Format) -> None:
     if form is Format.JSON:
         echo_json(about)
     else:
-        click.echo("\n".join(_page(about)))
+        echo("\n".join(_page(about)))
 
 
 class FileJson(TypedDict):

@@ -12,7 +12,7 @@ from click import option
 
 from fecm._files import check_outputs
 from fecm._text import csv_lines
-from fecm.cli.common import echo, echo_json, note
+from fecm.cli.common import echo, echo_json, echo_lines, note
 from fecm.cli.decks import refusing_errors
 from fecm.cli.options import (
     DECK_PATH,
@@ -180,4 +180,4 @@ def _print(natural: PlateModes, form: Format) -> None:
     elif form is Format.CSV:
         sys.stdout.writelines(_csv(natural))
     else:
-        echo(natural)
+        echo_lines(natural.lines)

@@ -20,7 +20,7 @@ from fecm.authoring.new_deck import author
 from fecm.authoring.parameters import ObjectError
 from fecm.authoring.plate import CUSTOM, FIXTURES, Plate, Window
 from fecm.cli import new_values
-from fecm.cli.common import DASH, RefusedError, echo, echo_path, inform, note, write_text
+from fecm.cli.common import DASH, RefusedError, echo_findings, echo_path, inform, note, write_text
 from fecm.cli.isolation import reads
 from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options, unique
 from fecm.cli.options import (
@@ -312,13 +312,11 @@ def new_command(
     prepared = load_deck(text)
     if errors := prepared.errors():
         note(*doubts)
-        for finding in errors:
-            echo(finding.render("the new deck"), err=True)
+        echo_findings(errors, "the new deck")
         raise RefusedError("these options do not give a valid deck; nothing was written")
     note(*doubts)
     inform(*notes, *_additions(authored.deck))
-    for finding in prepared.findings:
-        echo(finding.render(str(output) if to_file else "the new deck"), err=True)
+    echo_findings(prepared.findings, str(output) if to_file else "the new deck")
     write_text(output, text, overwrite=overwrite)
     if to_file:
         echo_path(output)

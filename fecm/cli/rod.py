@@ -13,7 +13,7 @@ from click import option
 from fecm._errors import StudyError
 from fecm._measured_tables import read_table
 from fecm._record_faults import record_faults
-from fecm.cli.common import DASH, RefusedError, note
+from fecm.cli.common import DASH, RefusedError, echo, note
 from fecm.cli.decks import load_valid
 from fecm.cli.options import (
     DECK_PATH,
@@ -189,7 +189,7 @@ def pulse(options: PulseOptions) -> None:
     columns, rows = pulse_test.pulse_table(test, test.filtered)
     targets.write(columns, test.units, rows)
     if targets.table != DASH:
-        click.echo(test)
+        echo(test)
 
 
 def _uniform(shape: Shape) -> Struck:
@@ -314,8 +314,8 @@ def calibrate_command(
     if form is Format.JSON:
         click.echo(json.dumps({**vars(fit), "notes": faults}))
         return
-    click.echo(f"points            {fit.points}")
-    click.echo(f"slope V_F/V_a     {fit.slope:.6g} ± {fit.slope_error:.2g}")
-    click.echo(f"offset of V_F     {fit.offset:.6g} ± {fit.offset_error:.2g}")
-    click.echo(f"R²                {fit.r_squared:.6f}")
-    click.echo(f"sensitivity c_F   {fit.sensitivity:.6g} ± {fit.sensitivity_error:.2g}")
+    echo(f"points            {fit.points}")
+    echo(f"slope V_F/V_a     {fit.slope:.6g} ± {fit.slope_error:.2g}")
+    echo(f"offset of V_F     {fit.offset:.6g} ± {fit.offset_error:.2g}")
+    echo(f"R²                {fit.r_squared:.6f}")
+    echo(f"sensitivity c_F   {fit.sensitivity:.6g} ± {fit.sensitivity_error:.2g}")

@@ -14,6 +14,7 @@ from fecm.cli.common import (
     CheckFailedError,
     RefusedError,
     echo,
+    echo_findings,
     echo_json,
     echo_summary,
     watching,
@@ -101,8 +102,7 @@ def run_command(
     options["output"] = options["output"] or Path(f"{deck.stem}.h5")
     with refusing_errors("; nothing was run"):
         run = Run(deck, **options)
-    for finding in run.findings:
-        echo(finding.render(run.source), err=True)
+    echo_findings(run.findings, run.source)
     jobs = run.problems
     if fail_limit is not None and not any(job.problem.work.passes["FAIL"] for job in jobs):
         raise RefusedError(f"--fail-limit needs the macro FAIL; {deck} has none")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 from typing import Any, TextIO
@@ -41,6 +42,15 @@ class Terminal:
         if os.environ.get("FORCE_COLOR", "0") not in ("", "0"):
             return True
         return stream.isatty() and os.environ.get("TERM") != "dumb"
+
+    def columns(self, stream: TextIO) -> int | None:
+        """Return the width of a terminal, or COLUMNS; None if the stream is not a terminal."""
+        if not stream.isatty():
+            return None
+        with contextlib.suppress(OSError, ValueError):
+            given = int(os.environ.get("COLUMNS") or 0)
+            return given or os.get_terminal_size(stream.fileno()).columns or None
+        return None
 
 
 terminal = Terminal()

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import sys
 from itertools import chain, tee
 
 import click
 
-from fecm.cli.common import CheckFailedError, RefusedError
+from fecm._table import hanging
+from fecm.cli.common import CheckFailedError, RefusedError, echo
 from fecm.cli.options import FORMAT_OPTION, Format, typical
+from fecm.cli.terminal import terminal
 from fecm.verification import chosen, compute_rows
 from fecm.verification.case import table_lines, verification_page
 
@@ -39,7 +42,7 @@ def verify_command(cases: tuple[str, ...], listing: bool, markdown: bool, form: 
     if listing:
         width = max(len(case.name) for case in selected)
         for case in selected:
-            click.echo(f"{case.name.ljust(width)}  {case.title}")
+            echo(f"{case.name.ljust(width)}  {case.title}")
         return
     # The same rows twice: for the output as they are computed, and for the verdict.
     rows, kept = tee(chain.from_iterable(map(compute_rows, selected)))
@@ -52,10 +55,10 @@ def verify_command(cases: tuple[str, ...], listing: bool, markdown: bool, form: 
         click.echo(json.dumps(document, ensure_ascii=False, allow_nan=False))
     else:
         for line in table_lines(selected, rows):  # the table grows while the rows are computed
-            click.echo(line)
+            click.echo("\n".join(hanging(line, terminal.columns(sys.stdout))))
     fine = [row.within for row in kept]
     bad, count = fine.count(False), f"{len(fine)} row{'s' * (len(fine) != 1)}"
     if bad:
         raise CheckFailedError(f"{bad} of {count} {'is' if bad == 1 else 'are'} beyond tolerance")
     if form is Format.TEXT and not markdown:
-        click.echo(f"{count}, all within tolerance")
+        echo(f"{count}, all within tolerance")

@@ -13,6 +13,7 @@ from enum import StrEnum
 from typing import Annotated, Literal, NamedTuple, TypedDict
 
 from fecm._errors import FecmError
+from fecm._table import hanging
 
 MOST = 1000  # largest number of errors to keep; the same limit holds for warnings
 WIDEST = 200  # characters of a card that are shown
@@ -98,32 +99,36 @@ class Finding(NamedTuple):
             "hint": self.hint,
         }
 
-    def render(self, source: str) -> str:
+    def render(self, source: str, columns: int | None = None) -> str:
         """Format the finding as text, with the card and a caret under the field.
 
         A note is one line, without its card. The text starts with `source`, the name of the file.
+        Lines have at most some columns; of a longer card the part around the field is shown.
         """
         head = f"{self.severity}[{self.code}]: {self.message}"
         place = self.place
-        lines = [f"{source}:{place.line}:{place.first}: {head}" if place else f"{source}: {head}"]
+        where = f"{source}:{place.line}:{place.first}" if place else source
+        lines = hanging(f"{where}: {head}", columns)
         if place and self.severity is not Severity.NOTE:
-            lines += _marked_card(place)
+            lines += _marked_card(place, columns)
         if self.hint:
-            lines.append(f"   hint: {self.hint}")
+            lines += hanging(f"   hint: {self.hint}", columns)
         # A terminal would interpret control characters.
         return "\n".join("".join(c if c.isprintable() else "·" for c in line) for line in lines)
 
 
-def _marked_card(place: CardPlace) -> list[str]:
+def _marked_card(place: CardPlace, columns: int | None) -> list[str]:
     """Return the card with its line number, and a caret under the field."""
     card = place.text.rstrip()
     start, last = 0, place.last
-    if len(card) > WIDEST:  # show the part around the place
-        start = max(0, place.first - 1 - WIDEST // 2)
-        card = card[start : start + WIDEST]
-        last = min(last, start + len(card))
     number = str(place.line)
     margin = " " * len(number)
+    room = WIDEST if columns is None else columns - len(f" {number} | ")
+    widest = min(WIDEST, room)
+    if len(card) > widest:  # show the part around the place
+        start = max(0, place.first - 1 - widest // 2)
+        card = card[start : start + widest]
+        last = min(last, start + len(card))
     mark = " " * (place.first - start - 1) + "^" * max(1, last - place.first + 1)
     return [f" {number} | {card}", f" {margin} | {mark} {place.field}".rstrip()]
 

@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from fecm._machine import format_bytes
-from fecm._table import Row, Table, text_lines
+from fecm._table import Row, Table, titled_lines
 from fecm._text import significant
 from fecm._typing import FiniteFloat, Floats
 from fecm.deck.macros import flat
@@ -196,10 +196,9 @@ class ProblemSummary:
         values = vars(self).items()
         return {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in values}
 
-    def lines(self) -> list[str]:
-        """Return the lines of text that ``fecm check`` prints."""
-        table = summary_table(self)
-        return [table.title, *(f"  {line}" for line in text_lines(table, LABEL_WIDTH))]
+    def lines(self, columns: int | None = None) -> list[str]:
+        """Return the lines of text that ``fecm check`` prints; `columns` is the longest."""
+        return titled_lines(summary_table(self), width=LABEL_WIDTH, columns=columns)
 
 
 def summary_table(summary: ProblemSummary) -> Table:

@@ -13,7 +13,7 @@ from typing import Annotated, TypedDict
 import numpy as np
 
 from fecm._errors import OptionsError
-from fecm._table import Row, ShownNumber, Table, html_table, text_lines
+from fecm._table import Row, ShownNumber, Table, html_table, titled_lines
 from fecm._text import significant
 from fecm._typing import Floats
 from fecm.deck import model
@@ -173,9 +173,12 @@ class PlateModes:
         )
         return Table(tuple(rows), header, title=self.title or "(no title)")
 
+    def lines(self, columns: int | None = None) -> list[str]:
+        """Return the lines that `fecm modes` prints; `columns` is the longest."""
+        return titled_lines(self._table(), columns=columns)
+
     def __str__(self) -> str:
-        table = self._table()
-        return "\n".join([table.title, *(f"  {line}" for line in text_lines(table))])
+        return "\n".join(self.lines())
 
     def _repr_html_(self) -> str:
         """Return tables of the modes and their notes, for notebooks."""

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from fecm._errors import warn
-from fecm._table import Row, Table, html_table, text_lines
+from fecm._table import Row, Table, html_table, titled_lines
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.judge.limits import TOO_SOFT
@@ -124,10 +124,12 @@ class Estimate:
         header = ("model", *(name.replace("_", " ") for name in COLUMNS))
         return Table(tuple(shared), title=self.title or "(no title)"), Table(models, header)
 
+    def lines(self, columns: int | None = None) -> list[str]:
+        """Return the lines that `fecm estimate` prints; `columns` is the longest."""
+        return titled_lines(*self._tables(), width=LABEL_WIDTH, columns=columns)
+
     def __str__(self) -> str:
-        shared, models = self._tables()
-        lines = [*text_lines(shared, LABEL_WIDTH), *text_lines(models)]
-        return "\n".join([shared.title, *(f"  {line}" for line in lines)])
+        return "\n".join(self.lines())
 
     def _repr_html_(self) -> str:
         """Return tables of the estimate and its notes, for notebooks."""
