@@ -17,7 +17,7 @@ from fecm._typing import Array
 from fecm.plot.data import patches, strain_points
 from fecm.plot.kinds import MISSING, Picture, PlotError
 from fecm.plot.mesh import Support, support_masks
-from fecm.plot.pictures import draw, save_picture
+from fecm.plot.pictures import draw, draw_entitled, save_picture
 from fecm.plot.plate import profile
 from fecm.plot.style import COLOURS, scale
 from tests.builders import distorted_square
@@ -355,6 +355,21 @@ def test_widths_are_those_of_a_column_and_of_a_page(result: Result) -> None:
 
 
 # Delamination threshold -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["force", "contour", "surface"])
+def test_in_files_a_picture_of_one_result_has_the_title_of_its_deck_above_all_else(
+    result: Result, kind: str
+) -> None:
+    figure = draw_entitled(kind, {"a": result}).figure
+    figure.draw_without_rendering()
+    renderer = figure.canvas.get_renderer()
+    (title,) = [text for text in figure.texts if text.get_text() == result.title]
+    below = title.get_window_extent().y0
+    others = [*figure.legends, *figure.axes]
+    assert title.get_window_extent().y1 <= figure.bbox.y1
+    assert all(part.get_tightbbox(renderer).y1 <= below for part in others)
+    assert not draw_entitled("force", {"a": result, "b": result}).figure.texts
 
 
 def test_force_draws_the_delamination_threshold_if_there_is_one(result: Result) -> None:

@@ -379,6 +379,15 @@ def test_a_map_over_mass_and_velocity_has_lines_of_equal_energy() -> None:
     assert "equal energy" in [line.get_label() for line in axes.get_lines()]
 
 
+def test_lines_of_equal_energy_are_labelled_in_joules() -> None:
+    deck = NAMED.replace("UNIT\nin lbf s", "UNIT\nmm N s")
+    sweep = fecm.sweep(deck, {"mass": [1e-4, 2e-4, 3e-4], "velocity": [2e3, 4e3, 6e3]})
+    (axes, _) = plot(sweep, "max_indentation").axes
+    energies = [text.get_text() for text in axes.texts if text.get_text().endswith("J")]
+    # 1/2 m v^2 in N*mm, up to 3.5e-4 and 7000 at the corner of the map: 8.575 J.
+    assert energies == [f"{level:g} J" for level in (1.5, 3.0, 4.5, 6.0, 7.5)]
+
+
 def test_a_quantity_that_no_case_has_yet_is_refused() -> None:
     sweep = fecm.sweep(small(), {"velocity": VELOCITIES})
     with pytest.raises(PlotError, match=r"3 of 3 cases .* still in contact at the end"):

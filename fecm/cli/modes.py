@@ -29,7 +29,7 @@ from fecm.deck.units import column_name
 from fecm.identification.edges import KR, fit_edges
 from fecm.mechanics.projectile import LUMPED, MASSES, MassMatrix
 from fecm.plot.kinds import PictureKind
-from fecm.plot.pictures import check_suffix, draw, require_matplotlib, save_picture
+from fecm.plot.pictures import check_suffix, draw_entitled, require_matplotlib, save_picture
 from fecm.studies.modes import MOST_MODES, ModeJson, PlateModes, modes
 
 
@@ -145,7 +145,7 @@ def modes_command(
     with refusing_errors("; no modes were computed"):
         natural = modes(deck, number, mass=mass, held=held, output=output, overwrite=overwrite)
     if picture is not None:
-        drawn = draw(PictureKind.MODES, {deck.stem: natural.result})
+        drawn = draw_entitled(PictureKind.MODES, {deck.stem: natural.result})
         save_picture(drawn, picture, overwrite=overwrite)
     note(*natural.notes)
     _print(natural, form)

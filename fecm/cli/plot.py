@@ -31,7 +31,13 @@ from fecm.cli.options import (
 )
 from fecm.mechanics.failure import CRITERIA
 from fecm.plot.kinds import KINDS, LackingError, Picture, PictureKind
-from fecm.plot.pictures import check_picture_options, check_suffix, draw, options_of, save_picture
+from fecm.plot.pictures import (
+    check_picture_options,
+    check_suffix,
+    draw_entitled,
+    options_of,
+    save_picture,
+)
 from fecm.results.hdf5_reader import FileContents, read
 from fecm.results.metrics import COLUMNS
 from fecm.results.result import Result, result_of
@@ -296,7 +302,7 @@ def _draw(
         for kind in kinds:
             options_of_kind = {name: options[name] for name in options_of(kind) if name in options}
             try:
-                pictures[kind] = draw(kind, results, **options_of_kind)
+                pictures[kind] = draw_entitled(kind, results, **options_of_kind)
             except LackingError as error:
                 lacking[kind] = error
             advance(1)

@@ -212,8 +212,13 @@ class Location(Saved, Reported):
                 object.__setattr__(self, name, read_only(values))
 
     @property
+    def title(self) -> str:
+        """Title of the deck."""
+        return self.deck.title
+
+    @property
     def _name(self) -> str:
-        return self.deck.title or "the impact"
+        return self.title or "the impact"
 
     @property
     def sd_x(self) -> float:

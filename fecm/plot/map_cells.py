@@ -11,7 +11,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from fecm._typing import Array, Bools, Floats
-from fecm.deck.units import unit_of
+from fecm.deck.units import quantity, unit_of
 from fecm.plot import style
 from fecm.plot.sweep_data import DrawnVariable
 from fecm.results.metrics import FACTOR
@@ -78,11 +78,11 @@ def draw_equal_energies(axes: Axes, sweep: SweepResult, x: DrawnVariable, y: Dra
     mass, velocity = (across, up[:, None]) if x is masses[0] else (up[:, None], across)
     parts = float(sweep[FACTOR].max()) if FACTOR in sweep else 1.0  # of a symmetric plate
     energy = 0.5 * parts * mass * velocity**2
-    scale = style.scale(float(energy.max()), unit_of("force*length", sweep.units))
+    unit = unit_of("force*length", sweep.units)
     levels = MaxNLocator(ENERGY_LINES).tick_values(0.0, float(energy.max()))
     inner = [level for level in levels if energy.min() < level < energy.max()]
     lines = axes.contour(across, up, energy, inner, **ENERGY)
-    for label in axes.clabel(lines, fmt=scale.show, **ENERGY_LABEL):
+    for label in axes.clabel(lines, fmt=lambda level: quantity(float(level), unit), **ENERGY_LABEL):
         label.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
     axes.plot([], [], color="black", ls=style.DOTTED, lw=0.9, label="equal energy")
     return True

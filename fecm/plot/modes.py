@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 COLUMNS: dict[Width, int] = {"column": 2, "full": 4}
 TITLE = 0.3  # height of a title and its room (in)
+LABELS = 0.35  # height of the numbers and the name of an axis (in)
 MOVED = 0.1  # largest displacement of a mode in the plane, over the longer side
 LEAST = 0.01  # of the largest w: a nodal line is drawn between larger values of both signs
 
@@ -43,7 +44,8 @@ def modes_picture(results: Mapping[str, Result], *, width: Width = "full") -> Pi
     place = style.scale_of(results, "length", [cut.points])
     columns = min(len(shapes), COLUMNS[width])
     rows = math.ceil(len(shapes) / columns)
-    ratio = aspect(cut.points) + TITLE * columns / style.WIDTHS[width]
+    texts = TITLE + LABELS / rows
+    ratio = aspect(cut.points) + texts * columns / style.WIDTHS[width]
     figure, axes = style.panels(width, rows, columns, sharex=True, sharey=True, ratio=ratio)
     for ax, number, frequency, shape in zip(
         axes, numbers, frequencies.values, shapes, strict=False

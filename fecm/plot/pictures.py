@@ -173,6 +173,23 @@ def draw(
         return drawing_of(kind)(results, **options)
 
 
+def draw_entitled(
+    kind: str,
+    results: Mapping[str, Result | SweepResult | Location],
+    **options: Unpack[PictureOptions],
+) -> Picture:
+    """Draw a picture for a file; a picture of one result has the title of its deck."""
+    picture = draw(kind, results, **options)
+    if len(results) == 1:
+        import matplotlib  # as in `draw`
+
+        from fecm.plot.style import RC, entitle
+
+        with matplotlib.rc_context(RC):
+            entitle(picture.figure, next(iter(results.values())).title)
+    return picture
+
+
 def draw_results(
     kind: str,
     results: Mapping[str, Result | SweepResult | Location],
@@ -228,7 +245,7 @@ def draw_results(
             raise PlotError("give path or ax, not both: ax.figure.savefig writes your own figure")
         check_suffix(kind, Path(path))
         check_outputs([Path(path)], overwrite)
-        picture = draw(kind, results, **options)
+        picture = draw_entitled(kind, results, **options)
         save_picture(picture, Path(path), overwrite=overwrite)
         return picture.figure.axes[0]
     drawing_of(kind)  # without matplotlib, this says what to install

@@ -24,6 +24,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import Formatter, Locator
 
 from fecm._text import printable
@@ -45,6 +46,7 @@ WIDTHS: dict[Width, float] = {"column": 3.5, "full": 7.2}  # inches
 RATIO: dict[Width, float] = {"column": 0.68, "full": 0.45}  # height over width of a graph
 LETTERS = 16  # letters of small text per inch
 FOOTER = 7.0  # size of small text (points)
+TITLE, TITLE_LINE = 8.0, 0.16  # size of a title (points), and height of its lines (in)
 COLOUR_BAR_HEIGHT = 0.32  # height of a colour bar with its labels (in)
 # Dots per inch in print and on a screen.
 RESOLUTION = 300
@@ -377,6 +379,27 @@ def footer(axes: Axes, lines: Sequence[str]) -> None:
         axes.set_xlabel(f"{axes.get_xlabel()}\n{text}")
     else:
         figure.supxlabel(text, fontsize=FOOTER)
+
+
+def entitle(figure: Figure, title: str) -> None:
+    """Write the title of a deck above a complete picture, which becomes higher by its lines."""
+    if title and (above := figure.get_suptitle()):
+        figure.suptitle(f"{literal(title)}\n{above}", fontsize=TITLE)
+        return
+    wide, high = figure.get_size_inches()
+    lines = textwrap.wrap(printable(title), int(LETTERS * wide))
+    room = high / (high + TITLE_LINE * len(lines))
+    figure.set_figheight(high / room)
+    for drawn in figure.legends:  # at the edge of the figure
+        drawn.borderaxespad += 72.0 * TITLE_LINE * len(lines) / drawn.prop.get_size_in_points()
+    if (engine := figure.get_layout_engine()) is not None:
+        cast(ConstrainedLayoutEngine, engine).set(rect=(0.0, 0.0, 1.0, room))
+    else:
+        for axes in figure.axes:
+            box = axes.get_position(original=True)
+            axes.set_position((box.x0, box.y0 * room, box.width, box.height * room))
+    at_top = {"x": 0.02, "y": 1.0 - 0.02 * room, "va": "top", "fontsize": TITLE}
+    figure.text(s="\n".join(lines), parse_math=False, **at_top)
 
 
 def lines_legend(figure: Figure, axes: Axes, title: str = "") -> None:
