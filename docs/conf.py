@@ -80,7 +80,7 @@ html_theme_options = {
 }
 html_sidebars = {page: [] for page in ("install", "tutorial", "changelog")}  # no pages below them
 html_show_sourcelink = False
-html_split_index = True  # a page for each letter
+templates_path = ["_templates"]
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_math_renderer = "mathml"
@@ -151,6 +151,8 @@ def _folds(app: Any, doctree: Any) -> None:
         depth = sum(isinstance(part, nodes.section) for part in _ancestors(section))
         if depth + 1 >= FOLDED.get(app.env.docname, 9):
             _fold(section)
+        if depth > 1 and app.env.docname in FOLDED:
+            _fold_parts(section)
     for described in doctree.findall(addnodes.desc):
         outer = any(isinstance(part, addnodes.desc) for part in _ancestors(described))
         if described["domain"] == "py" and not outer:
@@ -178,6 +180,17 @@ def _fold(node: Any) -> None:
     opening = f'<details class="fold"><summary>{label}</summary>'
     folded = [*node[first:last], nodes.raw("", "</details>", format="html")]
     node[first:last] = [nodes.raw("", opening, format="html"), *folded]
+
+
+def _fold_parts(section: Any) -> None:
+    """Fold the sections of a section, such as the commands of a command, as one."""
+    from docutils import nodes
+
+    parts = [n for n, part in enumerate(section) if isinstance(part, nodes.section)]
+    if parts:
+        opening = f'<details class="fold"><summary>{len(parts)} parts</summary>'
+        section.insert(parts[-1] + 1, nodes.raw("", "</details>", format="html"))
+        section.insert(parts[0], nodes.raw("", opening, format="html"))
 
 
 def _literally(app: Any, context: Any, lines: list[str]) -> None:

@@ -189,7 +189,7 @@ PLATE_VALUES: tuple[SweepValue[PlateSetter], ...] = (
                      "them the centre of the patch and the gages"),
     SweepValue("support", Changes.PLATE, "", plate.set_support, ValueKind.TEXT,
              meaning="`free`, `soft`, `simple`, `pinned` or `clamped`: "
-                     "[support](#supports-of-the-outline) of the outline"),
+                     "[support](supports.md#sweeps-over-supports) of the outline"),
     SweepValue("edge_kr", Changes.PLATE, "", supports.set_edge_rotation,
              meaning="factor of the stiffness of the rotations on all `SPRI LINE` "
                      "([elastic edges](supports.md#elastic-edges))"),
