@@ -151,18 +151,19 @@ def sweep_linear(response: Floats, rigid: float, swept: Swept) -> None:
     A plate that is not held has a rigid motion: `rigid` times the number of steps since a force of
     1.  Raises MemoryError.
     """
-    if not LIBRARY.fecm_sweep(ctypes.byref(_structure(response, rigid, swept))):
+    if not LIBRARY.fecm_sweep(ctypes.byref(sweep_structure(response, rigid, swept))):
         raise MemoryError
 
 
 def sweep_reduced(plate: ReducedStruct, swept: Swept) -> None:
     """Compute impacts on a nonlinear plate in a few modes.  Raises MemoryError."""
-    structure = _structure(np.empty(0), 0.0, swept)
+    structure = sweep_structure(np.empty(0), 0.0, swept)
     if not LIBRARY.fecm_reduced(ctypes.byref(structure), ctypes.byref(plate)):
         raise MemoryError
 
 
-def _structure(response: Floats, rigid: float, swept: Swept) -> SweepStruct:
+def sweep_structure(response: Floats, rigid: float, swept: Swept) -> SweepStruct:
+    """Return what the kernel of a linear plate takes; see :func:`sweep_linear`."""
     modes, step, law, given, force, found = swept
     T, h = modes.step(step)
     before, after = step.weights
