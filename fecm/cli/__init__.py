@@ -74,6 +74,9 @@ GROUPED = {
     },
     "Many impacts": {
         "sweep": LazyCommand("fecm.cli.sweep", "Run DECK many times with varied parameters."),
+        "explore": LazyCommand(
+            "fecm.cli.explore", "Write a page (HTML) on which an impact follows sliders."
+        ),
     },
     "Measurements": {
         "identify": LazyCommand("fecm.cli.identify", "Fit parameters to a measured contact force."),

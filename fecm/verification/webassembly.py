@@ -21,9 +21,10 @@ class WasmKernel:
     def __init__(self) -> None:
         import wasmtime  # optional
 
-        self._store = wasmtime.Store()
-        module = wasmtime.Module(self._store.engine, PATH.read_bytes())
-        self._exports: Any = wasmtime.Instance(self._store, module, []).exports(self._store)
+        library: Any = wasmtime
+        self._store = library.Store()
+        module = library.Module(self._store.engine, PATH.read_bytes())
+        self._exports = library.Instance(self._store, module, []).exports(self._store)
         self._exports["_initialize"](self._store)
 
     def sweep_linear(self, response: Floats, rigid: float, swept: Swept) -> None:

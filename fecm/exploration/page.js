@@ -1,0 +1,655 @@
+"use strict";
+// Impacts on a linear plate as sliders move.  The kernel of the package, compiled to WebAssembly, computes
+// every contact force; this file hands it the values, takes numbers from its forces, and draws.
+// All values are in the deck's units.
+const byId = name => document.getElementById(name);
+const source = document.documentElement.outerHTML; // before the page changes, to save it
+const data = JSON.parse(byId("data").textContent);
+const LANES = 8; // cases that the kernel computes in the time of one
+const CURVE = 40, DRAWS = 1000, SLICE = 12; // points, random impacts, ms of work between two events
+const PINS = 3;
+
+const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
+const doubles = text => new Float64Array(bytes(text).buffer);
+
+// Kernel --------------------------------------------------------------------------------------------------------
+
+/** The kernel with the memory of one plate. */
+class Kernel {
+  constructor(exports) {
+    this.exports = exports;
+    exports._initialize();
+    this.at = {};
+  }
+
+  /** Put a plate into the memory, in place of the last one. */
+  load(plate) {
+    Object.values(this.at).forEach(this.exports.free);
+    const values = plate.structure, arrays = {};
+    for (const [name, kind] of data.fields)
+      if (kind === "pointer" && name in values) arrays[name] = doubles(values[name]);
+    arrays.given = new Float64Array(data.given.length * LANES);
+    arrays.found = new Float64Array(data.found.length * LANES);
+    const steps = arrays.plate.length;
+    const sizes = {...Object.fromEntries(Object.entries(arrays).map(([name, array]) => [name, array.length])),
+                   force: steps * LANES, structure: 64};
+    this.at = Object.fromEntries(Object.entries(sizes).map(([name, size]) => [name, this.exports.malloc(8 * size)]));
+    if (Object.values(this.at).includes(0)) throw new Error("there is not enough memory");
+    for (const [name, array] of Object.entries(arrays)) this.view(name, array.length).set(array);
+    const view = new DataView(this.exports.memory.buffer, this.at.structure, 8 * sizes.structure);
+    for (const [name, kind, offset] of data.fields) {
+      if (kind === "pointer") view.setUint32(offset, this.at[name], true);
+      else if (kind === "double") view.setFloat64(offset, values[name], true);
+      else view.setBigInt64(offset, BigInt(name === "stride" ? LANES : values[name]), true);
+    }
+    this.plate = plate;
+    this.steps = steps;
+    this.enough = undefined;
+    this.dt = values.dt;
+    return this;
+  }
+
+  view(name, count) { return new Float64Array(this.exports.memory.buffer, this.at[name], count); }
+
+  /** Compute up to LANES impacts, and give the summary of each. */
+  run(impacts, steps = this.steps) {
+    const strike = this.plate.strike;
+    const rows = {K: i => i.k, Q: () => strike.q, CRITICAL: () => strike.critical, SLOPE: () => strike.slope,
+                  VELOCITY: i => i.velocity, FACTOR: i => i.mass / strike.unitMass};
+    const given = this.view("given", data.given.length * LANES);
+    data.given.forEach((name, row) => impacts.forEach((impact, lane) => { given[row * LANES + lane] = rows[name](impact); }));
+    const view = new DataView(this.exports.memory.buffer, this.at.structure);
+    for (const [name, , offset] of data.fields)
+      if (name === "cases") view.setBigInt64(offset, BigInt(impacts.length), true);
+      else if (name === "steps") view.setBigInt64(offset, BigInt(steps), true);
+    if (!this.exports.fecm_sweep(this.at.structure)) throw new Error("there is not enough memory");
+    const force = this.view("force", steps * impacts.length), found = this.view("found", data.found.length * LANES);
+    return impacts.map((impact, lane) => summary(this.plate, this.dt, impact, force.subarray(lane * steps, (lane + 1) * steps),
+      Object.fromEntries(data.found.map((name, row) => [name, found[row * LANES + lane]]))));
+  }
+
+  /** Compute an impact in as few steps as are likely to decide it, and in all if these do not. */
+  one(impact) {
+    const steps = Math.min(this.steps, this.enough ?? this.steps);
+    let [result] = this.run([impact], steps);
+    if (steps < this.steps && (!result.over || isNaN(result.max_deflection))) [result] = this.run([impact]);
+    this.enough = Math.ceil(1.15 * result.contactEnd / this.dt) + LANES;
+    return {...result, force: result.force.slice()};
+  }
+
+  /** Compute impacts whose peaks are wanted, in a short run, and those that it leaves open in a long one. */
+  peaks(impacts, steps) {
+    const results = this.run(impacts, steps);
+    const open = steps < this.steps ? results.flatMap((result, row) => isNaN(result.peak_force) ? [row] : []) : [];
+    if (open.length)
+      this.run(open.map(row => impacts[row])).forEach((result, index) => { results[open[index]] = result; });
+    return results;
+  }
+}
+
+// Numbers of an impact ------------------------------------------------------------------------------------------
+
+/** What fecm/results/metrics.py takes from the forces of a case; NaN where its end has not decided a value. */
+function summary(plate, dt, impact, force, found) {
+  const {mass, velocity} = impact, factor = plate.strike.factor, steps = force.length, end = steps * dt;
+  let impulse = 0, lever = 0, peak = 0, peakAt = 0, touching = 0, contacts = 0, lastAt = -1, begin = 0;
+  for (let n = 0; n < steps; n++) {
+    const f = force[n];
+    if (!(f > 0)) continue;
+    const weight = n + 1 < steps ? dt : 0.5 * dt;
+    impulse += weight * f;
+    lever += weight * f * (steps - 1 - n) * dt;
+    touching++;
+    if (lastAt !== n - 1 || n === 0) { contacts++; begin = n; }
+    lastAt = n;
+    if (f > peak) { peak = f; peakAt = n; }
+  }
+  const last = force[steps - 1], rebound = impulse / mass - velocity;
+  let present = 0;
+  if (last > 0) for (let n = begin; n < steps; n++) present = Math.max(present, force[n]);
+  const motion = {last, peak, present, leaving: rebound + plate.mobility * impulse, ratio: mass / plate.mass,
+                  position: velocity * end - lever * (1 / mass + plate.mobility),
+                  speed: found.LARGEST_DW / dt, energy: found.BENT_WORK, compliance: found.COMPLIANCE};
+  const held = plate.mobility === 0, reach = Math.sqrt(2 * data.ends.rules.RESERVE * motion.compliance * Math.max(motion.energy, 0));
+  const state = endOf(motion, held, reach), over = state === "contact over", known = over || data.ends.words[state][0] !== "outside the model";
+  const where = (mask, value) => mask ? value : NaN;
+  const limit = plate.threshold ? plate.threshold.force * Math.sqrt(impact.giic / plate.threshold.toughness) : NaN;
+  const settled = over && (!held || reach <= data.ends.rules.RINGING * found.HIGHEST);
+  const lost = found.LOST + plate.nodeMass * found.LARGEST_DDW ** 2 / (8 * dt * dt);
+  return {
+    impact, force, dt, end: state, reached: factor * peak, limit, over,
+    balance: found.INITIAL > 0 ? lost / found.INITIAL : lost, unconverged: found.UNCONVERGED,
+    deepest: found.DEEPEST, highest: held ? found.HIGHEST : NaN, contactEnd: (lastAt + 1) * dt,
+    peak_force: where(known, factor * peak), time_of_peak: where(known && touching, (peakAt + 1) * dt),
+    contacts: where(over, contacts), contact_time: where(over, touching * dt),
+    max_deflection: where(settled, found.HIGHEST),
+    max_indentation: where(over || (known && found.INDENTATION < found.DEEPEST), found.DEEPEST),
+    permanent_indentation: where(over, found.PERMANENT), impulse: where(over, factor * impulse),
+    rebound_velocity: where(over, rebound), energy_absorbed: where(over, factor * 0.5 * mass * (velocity ** 2 - rebound ** 2)),
+    contact_loop: where(over, factor * found.CONTACT_WORK),
+  };
+}
+
+/** State of the contact at the end of a case, as fecm/judge/end.py decides it. */
+function endOf(m, held, reach) {
+  const {CLEAR, CLEAR_FREE, PRESSED, LIGHT, FALLEN, GONE} = data.ends.rules;
+  const clear = (held ? CLEAR : CLEAR_FREE) + PRESSED * (m.last > 0 ? m.last / m.peak : 0);
+  const isClear = m.leaving > clear * m.speed || (m.leaving > 0 && m.ratio < LIGHT);
+  if (m.last > 0)
+    return isClear && m.last < FALLEN * Math.min(m.present, m.peak) ? "in contact, peak passed" : "in contact, peak not reached";
+  if (m.leaving < 0) return "between contacts";
+  const near = m.leaving <= GONE * m.speed && !(m.position < -reach);
+  return near ? (isClear ? "peak passed, may touch again" : "may touch again") : "contact over";
+}
+
+/** Judgements of a result, in the words of the package's limits. */
+function judgements(plate, result) {
+  const rows = [], {deflection, indentation} = plate.limits;
+  const row = (quantity, size, level, words) => rows.push({quantity, size, level, words});
+  const limited = (limit, value, thickness) => {
+    if (isNaN(value) || !isFinite(limit.most)) return;
+    const ratio = value / thickness, beyond = value > limit.most;
+    const soft = limit === deflection && beyond ? `; ${plate.softness.findLast(([at]) => at <= ratio + 0.025)?.[1] ?? ""}` : "";
+    row(limit.quantity, `${digits(ratio, 3)} h`, beyond ? limit.level : "within range", limit.words + soft);
+  };
+  limited(deflection, result.highest, plate.thickness);
+  limited(indentation, result.deepest, plate.indented);
+  if (result.limit > 0) {
+    const beyond = result.reached > plate.crossed * result.limit;
+    row("force over the delamination threshold", digits(result.reached / result.limit, 3), beyond ? data.elastic[1] : "within range", data.elastic[0]);
+  }
+  const [level, words] = data.ends.words[result.end];
+  row("end of the contact", result.end, level, words);
+  if (result.unconverged) row("steps", String(result.unconverged), "doubtful", data.balance[2]);
+  row("energy balance", `${digits(100 * result.balance, 2)} %`, result.balance < data.balance[0] ? "within range" : "outside the model", data.balance[1]);
+  row("failure of plies", "–", "not judged", "this page has forces only: a run with FAIL has the exposures");
+  return rows;
+}
+
+// Texts ---------------------------------------------------------------------------------------------------------
+
+const digits = (value, count = 4) => String(Number(value.toPrecision(count)));
+const tag = level => ({"within range": "within", "doubtful": "doubtful", "outside the model": "outside"})[level] ?? "unjudged";
+
+/** Power of ten and name of a convenient unit of a quantity near a value. */
+function unitOf(name, value) {
+  const [unit, base, power] = data.units[name];
+  if (!base || !["s", "N", "g", "J"].includes(base) || !(Math.abs(value) > 0) || !isFinite(value)) return [0, unit];
+  const scale = 3 * Math.floor(Math.log10(Number(Math.abs(value).toPrecision(4))) / 3 + 1e-12);
+  const prefix = data.prefixes[scale + power];
+  return prefix === undefined ? [0, unit] : [scale, prefix + base === "Mg" ? "t" : prefix + base];
+}
+
+function quantity(name, value, count = 4) {
+  if (!Number.isFinite(value)) return "open";
+  const [power, unit] = unitOf(name, value);
+  return `${digits(value / 10 ** power, count)} ${unit}`.trim();
+}
+
+function element(name, attributes = {}, ...children) {
+  const made = attributes.svg ? document.createElementNS("http://www.w3.org/2000/svg", name) : document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) if (key !== "svg") made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+}
+
+// Pictures ------------------------------------------------------------------------------------------------------
+
+/** Numbers at equal round distances from 0 to a largest value. */
+function ticks(most, count) {
+  const rough = most / count, power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].find(size => size * power >= rough) * power;
+  return Array.from({length: Math.floor(most / step + 1e-9) + 1}, (_, n) => Number((n * step).toPrecision(6)));
+}
+
+/** Draw lines, bars, marks and levels: axes have a `name` of a quantity, a label and the largest value. */
+function chart(svg, {x, y, lines = [], marks = [], level, bars = [], words}) {
+  const width = svg.clientWidth || 640, height = svg.clientHeight || 280, left = 58, right = 12, top = 14, bottom = 40;
+  svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  svg.setAttribute("aria-label", words);
+  const [xPower, xUnit] = unitOf(x.name, x.most), [yPower, yUnit] = unitOf(y.name, y.most);
+  const toX = value => left + (width - left - right) * Math.min(1, value / x.most);
+  const toY = value => height - bottom - (height - top - bottom) * Math.max(-0.05, Math.min(1, value / y.most));
+  const parts = [];
+  const add = (name, attributes, text) => parts.push(element(name, {svg: true, ...attributes}, ...(text === undefined ? [] : [text])));
+  const one = value => Math.round(value * 10) / 10;
+  for (const value of ticks(x.most / 10 ** xPower, width < 480 ? 4 : 8)) {
+    const at = one(toX(value * 10 ** xPower));
+    add("path", {class: "grid", d: `M${at} ${top}V${height - bottom}`});
+    add("text", {x: at, y: height - bottom + 15, "text-anchor": "middle"}, String(value));
+  }
+  for (const value of ticks(y.most / 10 ** yPower, 5)) {
+    const at = one(toY(value * 10 ** yPower));
+    add("path", {class: "grid", d: `M${left} ${at}H${width - right}`});
+    add("text", {x: left - 6, y: at + 4, "text-anchor": "end"}, String(value));
+  }
+  add("path", {class: "axis", d: `M${left} ${top}V${height - bottom}H${width - right}`});
+  add("text", {x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle"}, xUnit ? `${x.label} (${xUnit})` : x.label);
+  add("text", {x: 12, y: (top + height - bottom) / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${(top + height - bottom) / 2})`},
+    yUnit ? `${y.label} (${yUnit})` : y.label);
+  for (const {from, to, height: size, kind} of bars)
+    add("rect", {class: `bar ${kind}`, x: one(toX(from)), y: one(toY(size)), width: Math.max(0.5, one(toX(to) - toX(from) - 1)), height: one(toY(0) - toY(size))});
+  if (level && level.of === "x")
+    add("path", {class: "level", d: `M${one(toX(level.value))} ${top}V${height - bottom}`});
+  else if (level && level.value <= y.most) {
+    if (level.band && level.band[0] < level.band[1]) {
+      const [low, high] = level.band.map(toY);
+      add("rect", {class: "band", x: left, y: high, width: width - left - right, height: low - high});
+      add("text", {class: "of-level", x: width - right - 4, y: low - 5, "text-anchor": "end"}, "delamination of each interface");
+    }
+    add("path", {class: "level", d: `M${left} ${one(toY(level.value))}H${width - right}`});
+    add("text", {class: "of-level", x: width - right - 4, y: toY(level.value) - 5, "text-anchor": "end"}, level.label);
+  }
+  for (const line of lines) add("path", {class: line.kind, d: path(line, toX, toY, width)});
+  for (const mark of marks) add("circle", {class: "mark", cx: one(toX(mark.x)), cy: one(toY(mark.y)), r: 6});
+  lines.filter(line => line.label).forEach((line, row) => {
+    add("path", {class: line.kind, d: `M${left + 10} ${top + 8 + 16 * row}h26`});
+    add("text", {x: left + 42, y: top + 12 + 16 * row}, line.label);
+  });
+  svg.replaceChildren(...parts);
+  svg.toValue = event => Math.max(0, (event.clientX - svg.getBoundingClientRect().left - left) / (width - left - right) * x.most);
+}
+
+/** Path of a line.  Of many points in a pixel the lowest and the highest are drawn. */
+function path({x, y}, toX, toY, width) {
+  const every = Math.max(1, Math.floor(y.length / width)), points = [];
+  for (let start = 0; start < y.length; start += every) {
+    let low = start, high = start;
+    for (let n = start; n < Math.min(start + every, y.length); n++) {
+      if (y[n] < y[low]) low = n;
+      if (y[n] > y[high]) high = n;
+    }
+    for (const n of low === high ? [low] : [Math.min(low, high), Math.max(low, high)])
+      points.push(`${toX(x(n)).toFixed(1)} ${toY(y[n]).toFixed(1)}`);
+  }
+  return points.length ? `M${points.join("L")}` : "";
+}
+
+// State and sliders ---------------------------------------------------------------------------------------------
+
+const first = data.plates[0], names = Object.keys(first.values);
+const energyOf = (strike, velocity = strike.velocity) => 0.5 * strike.factor * strike.mass * velocity ** 2;
+const atRest = {
+  plate: first.values, speed: "energy", energy: energyOf(first.strike), mass: first.strike.mass, law: "k", k: first.strike.k,
+  giic: first.threshold?.toughness ?? null, scatter: {energy: 0, k: 0, giic: 0}, pins: [],
+};
+let state = structuredClone(atRest);
+
+const plateOf = wanted => data.plates.find(plate => names.every(name => plate.values[name] === wanted.plate[name])) ?? first;
+
+/** Impact of a state on its plate. */
+function impactOf(wanted, plate = plateOf(wanted)) {
+  const {factor} = plate.strike, mass = wanted.mass;
+  const velocity = {energy: () => Math.sqrt(2 * wanted.energy / factor / mass), velocity: () => wanted.velocity,
+                    height: () => Math.sqrt(2 * data.gravity * wanted.height)}[wanted.speed]();
+  return {velocity, mass, k: wanted.law === "radius" ? plate.strike.unitK * Math.sqrt(wanted.radius) : wanted.k, giic: wanted.giic};
+}
+
+/** Choose energy, velocity or height, k or radius, without a change of the impact. */
+function choose(kind, choice) {
+  const plate = plateOf(state), {velocity, k, mass} = impactOf(state, plate), short = value => Number(value.toPrecision(4));
+  const values = {energy: 0.5 * plate.strike.factor * mass * velocity ** 2, velocity, height: velocity ** 2 / (2 * data.gravity),
+                  k, radius: (k / plate.strike.unitK) ** 2};
+  state[kind] = choice;
+  state[choice] = short(values[choice]);
+}
+
+/** Sliders of a group: name, label, and the values at their ends. */
+function sliders() {
+  const base = atRest, {spans} = data, list = [];
+  const spread = (value, [low, high], power = 1) => [value * low ** power, value * high ** power];
+  const v = first.strike.velocity, of = {energy: spread(base.energy, spans.energy), velocity: spread(v, spans.energy, 0.5),
+    height: data.gravity ? spread(v * v / (2 * data.gravity), spans.energy) : null};
+  list.push({group: "Impact", name: state.speed, label: {energy: "energy", velocity: "velocity", height: "drop height"}[state.speed], ends: of[state.speed]});
+  if (first.strike.scales) list.push({group: "Impact", name: "mass", label: "mass of the projectile", ends: spread(base.mass, spans.mass)});
+  list.push(state.law === "k" ? {group: "Contact", name: "k", label: "contact coefficient k", ends: spread(base.k, spans.k)}
+    : {group: "Contact", name: "radius", label: "radius of a steel tip", ends: spread((base.k / first.strike.unitK) ** 2, spans.k, 1)});
+  if (base.giic !== null) {
+    list.push({group: "Laminate", name: "giic", label: "toughness G_IIc", ends: spread(base.giic, spans.giic)});
+    for (const [name, label] of [["energy", "energy"], ["k", "k"], ["giic", "G_IIc"]])
+      list.push({group: "Scatter (standard deviation)", name, label, ends: [0, 40], scatter: true});
+  }
+  return list;
+}
+
+/** Build the controls anew; the focus stays where it was. */
+function build() {
+  const focus = document.activeElement?.id, groups = new Map();
+  const fieldset = title => {
+    if (!groups.has(title)) groups.set(title, element("fieldset", {}, element("legend", {}, title)));
+    return groups.get(title);
+  };
+  const choice = (group, kind, label, options) => {
+    const select = element("select", {id: `choose-${kind}`}, ...options.map(([value, text]) => element("option", {value}, text)));
+    select.value = state[kind];
+    select.addEventListener("change", () => { choose(kind, select.value); build(); changed(); });
+    fieldset(group).append(element("div", {class: "row choice"}, element("label", {for: select.id}, label), select));
+  };
+  names.forEach((name, row) => {
+    const select = element("select", {id: `plate-${row}`}, ...new Set(data.plates.map(plate => plate.values[name])));
+    [...new Set(data.plates.map(plate => plate.values[name]))].forEach((value, n) => select.append(element("option", {value}, value)));
+    select.value = state.plate[name];
+    select.addEventListener("change", () => { state.plate = {...state.plate, [name]: select.value}; changed(); });
+    fieldset("Plate").append(element("div", {class: "row choice"}, element("label", {for: select.id}, name.replaceAll("_", " ")), select));
+  });
+  choice("Impact", "speed", "given by", [["energy", "energy"], ["velocity", "velocity"], ...(data.gravity ? [["height", "drop height"]] : [])]);
+  for (const slider of sliders()) {
+    if (slider.name === "k" && !slider.scatter && first.strike.unitK) lawChoice();
+    if (slider.name === "radius") lawChoice();
+    fieldset(slider.group).append(row(slider));
+  }
+  function lawChoice() { choice("Contact", "law", "given by", [["k", "k"], ["radius", "steel tip (estimate)"]]); }
+  byId("sliders").replaceChildren(...groups.values());
+  if (focus) byId(focus)?.focus({preventScroll: true});
+}
+
+/** Slider and field of a value.  The slider is logarithmic, except of a scatter in per cent. */
+function row({name, label, ends, scatter}) {
+  const values = scatter ? state.scatter : state, id = scatter ? `scatter-${name}` : name, [low, high] = ends;
+  const [power, unit] = scatter ? [0, "%"] : unitOf(name, values[name]);
+  const range = element("input", {type: "range", id, min: 0, max: scatter ? high : 400, step: 1, "aria-label": label});
+  const field = element("input", {type: "number", id: `${id}-value`, step: "any", min: 0});
+  const show = (skip) => {
+    const value = values[name];
+    if (skip !== range) range.value = scatter ? value : 400 * Math.log(value / low) / Math.log(high / low);
+    if (skip !== field) field.value = digits(value / 10 ** power, 4);
+    range.setAttribute("aria-valuetext", `${digits(value / 10 ** power)} ${unit}`);
+  };
+  range.addEventListener("input", () => {
+    values[name] = scatter ? Number(range.value) : Number((low * (high / low) ** (range.value / 400)).toPrecision(3));
+    show(range); changed();
+  });
+  field.addEventListener("input", () => {
+    const value = Number((Number(field.value) * 10 ** power).toPrecision(12));
+    if (!Number.isFinite(value) || !(scatter ? value >= 0 : value > 0)) return field.setAttribute("aria-invalid", "true");
+    field.removeAttribute("aria-invalid");
+    values[name] = value; show(field); changed();
+  });
+  show();
+  return element("div", {class: "row"}, element("label", {for: field.id}, label), field, element("span", {}, unit), range);
+}
+
+// Work in slices ------------------------------------------------------------------------------------------------
+
+let kernel, now, work = null, timer = false;
+const shown = {found: null, curve: null, draws: null};
+
+function changed() {
+  const plate = plateOf(state);
+  if (kernel.plate !== plate) kernel.load(plate);
+  now = kernel.one(impactOf(state, plate));
+  for (const name of ["curve", "draws"]) byId(name).classList.add("pending");
+  keep();
+  work = background(plate, structuredClone(state));
+  draw();
+  if (!timer) { timer = true; setTimeout(slice); }
+}
+
+/** Do a part of the work that answers to sliders later; an event in between may replace it. */
+function slice() {
+  timer = false;
+  const begin = performance.now();
+  while (work && performance.now() - begin < SLICE) if (work.next().done) { work = null; draw(); }
+  document.body.dataset.ready = String(!work);
+  if (work) { timer = true; setTimeout(slice); }
+}
+
+/** Energy of the threshold, curve over energies, and draws: each yield is a moment for an event. */
+function* background(plate, at) {
+  const base = impactOf(at, plate), energy = velocity => energyOf({...plate.strike, mass: base.mass}, velocity);
+  const steps = Math.min(kernel.steps, kernel.enough);
+  const speed = value => Math.sqrt(2 * value / plate.strike.factor / base.mass);
+  const many = function* (impacts) {
+    const results = [];
+    for (let n = 0; n < impacts.length; n += LANES) {
+      results.push(...kernel.peaks(impacts.slice(n, n + LANES), steps).map(({reached, peak_force, limit}) => ({reached, peak_force, limit})));
+      yield;
+    }
+    return results;
+  };
+  shown.found = now.limit > 0 ? energy(yield* searched(base, now.limit, many)) : null;
+  draw();
+  const widest = data.spans.energy[1] * atRest.energy, threshold = shown.found < 4 * widest ? 1.3 * shown.found : 0;
+  const most = 1.04 * Math.max(widest, energy(base.velocity), threshold);
+  const energies = Array.from({length: CURVE}, (_, n) => most * (n + 1) / CURVE);
+  const peaks = yield* many(energies.map(value => ({...base, velocity: speed(value)})));
+  shown.curve = {energies: [0, ...energies], peaks: [0, ...peaks.map(one => one.reached)], most};
+  byId("curve").classList.remove("pending");
+  draw();
+  shown.draws = null;
+  if (now.limit > 0 && Object.values(at.scatter).some(size => size > 0)) {
+    const normal = normals(1), spread = (value, size) => value * Math.exp(0.01 * size * normal());
+    const impacts = Array.from({length: DRAWS}, () => ({
+      ...base, velocity: speed(spread(energy(base.velocity), at.scatter.energy)), k: spread(base.k, at.scatter.k), giic: spread(base.giic, at.scatter.giic)}));
+    const results = yield* many(impacts);
+    shown.draws = {ratios: results.map(one => one.reached / one.limit), open: results.filter(one => isNaN(one.peak_force) && one.reached < one.limit).length};
+  }
+  byId("draws").classList.remove("pending");
+}
+
+/** Lowest velocity from 1/100 to 100 times that of an impact at which its peak reaches a force, as a sweep searches it. */
+function* searched(base, force, many) {
+  let trials = Array.from({length: 25}, (_, n) => base.velocity * 10 ** (n / 6 - 2));
+  for (let round = 0; round < 12; round++) {
+    const peaks = (yield* many(trials.map(velocity => ({...base, velocity})))).map(one => one.reached);
+    const after = peaks.findIndex(peak => peak >= force);
+    if (after < 1) return NaN;
+    const low = trials[after - 1], high = trials[after], width = high - low;
+    if (width <= 1e-6 * high) return high;
+    const share = Math.log(force / peaks[after - 1]) / Math.log(peaks[after] / peaks[after - 1]);
+    const guess = low * (high / low) ** (share > 0 && share < 1 ? share : 0.5);
+    const inside = [0.01, 1e-4, 1e-7].flatMap(part => [guess - part * width, guess + part * width]);
+    trials = [low, ...inside.filter(value => value > low && value < high), high].sort((a, b) => a - b);
+  }
+  return trials.at(-1);
+}
+
+/** Generator of standard normal numbers: the same for every state, so that a chance changes smoothly. */
+function normals(seed) {
+  let a = seed;
+  const uniform = () => {
+    a = (a + 0x6d2b79f5) | 0;
+    let t = Math.imul(a ^ (a >>> 15), 1 | a);
+    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
+    return ((t ^ (t >>> 14)) >>> 0) / 4294967296;
+  };
+  return () => Math.sqrt(-2 * Math.log(1 - uniform())) * Math.cos(2 * Math.PI * uniform());
+}
+
+// Page ----------------------------------------------------------------------------------------------------------
+
+const SHOWN = ["peak_force", "time_of_peak", "contacts", "contact_time", "max_deflection", "max_indentation", "permanent_indentation",
+               "impulse", "rebound_velocity", "energy_absorbed", "contact_loop"];
+
+function draw() {
+  const plate = plateOf(state), pins = state.pins, rows = judgements(plate, now), found = shown.found;
+  const delaminates = now.limit > 0 ? now.reached >= now.limit : null;
+  const level = now.limit > 0 ? {value: now.limit, label: "delamination threshold"} : null;
+  const band = level && plate.threshold.band.map(force => force * now.limit / plate.threshold.force);
+  const from = found ? `${plate.threshold.from} ${quantity("energy", found)}` : found === null ? "" : "at no energy near these";
+  const worst = rows.some(one => one.level === "outside the model") ? "outside" : rows.some(one => one.level === "doubtful") ? "doubtful" : "within";
+  const energy = energyOf({...plate.strike, mass: now.impact.mass}, now.impact.velocity);
+  const chance = shown.draws && shown.draws.ratios.filter(ratio => ratio >= 1).length / shown.draws.ratios.length;
+  const line = delaminates === null ? ["Peak force: ", element("strong", {}, quantity("peak_force", now.peak_force))]
+    : ["Delaminates: ", element("strong", {}, delaminates ? "yes" : isNaN(now.peak_force) ? "open" : "no"), `; ${from}`];
+  const doubts = rows.filter(one => ["outside", "doubtful"].includes(tag(one.level)));
+  byId("answer").className = worst;
+  byId("answer").replaceChildren(element("p", {}, ...line), ...(doubts.length ? [element("p", {}, `${worst === "outside" ? "Outside the model" : "Doubtful"}: ${doubts.map(one => `${one.quantity} ${one.size}`).join(", ")}`)] : []));
+  const heads = [["peak force", "peak_force", ""], ["time in contact", "contact_time", ""],
+    ["deflection", "max_deflection", isNaN(now.max_deflection) ? "" : `${digits(now.max_deflection / plate.thickness, 3)} h`], ["rebound", "rebound_velocity", ""]];
+  byId("headlines").replaceChildren(...[["impact", "", `${quantity("energy", energy)}`, `${quantity("velocity", now.impact.velocity)}`],
+    ...heads.map(([label, name, small]) => [label, name, quantity(name, now[name]), small])].map(([label, name, text, small]) =>
+    element("div", {}, element("dt", {}, label), element("dd", {"data-name": name}, text, ...(small ? [" ", element("small", {}, small)] : [])))));
+
+  const lines = pins.map((pin, n) => ({kind: `pin${n + 1}`, label: `pinned ${n + 1}`, ...curveOf(pin.result)}));
+  if (measured) lines.push({kind: "measured", label: measured.name.slice(0, 18), x: n => measured.time[n], y: measured.force});
+  lines.push({kind: "now", label: lines.length ? "now" : "", ...curveOf(now)});
+  const last = Math.max(now.contactEnd, ...pins.map(pin => pin.result.contactEnd), measured ? Math.min(measured.time.at(-1), 2 * now.contactEnd) : 0);
+  const highest = Math.max(now.reached, ...pins.map(pin => pin.result.reached), ...(measured?.force ?? []), 1e-300);
+  chart(byId("force"), {x: {name: "time", label: "time", most: 1.08 * last || 1}, y: {name: "peak_force", label: "contact force", most: 1.1 * (level && level.value < 3 * highest ? Math.max(highest, level.value) : highest)},
+    lines, level: level && {...level, band}, words: `Contact force over time: peak ${quantity("peak_force", now.peak_force)} at ${quantity("time_of_peak", now.time_of_peak)}`});
+  if (shown.curve) {
+    const {energies, peaks, most} = shown.curve, top = Math.max(...peaks);
+    chart(byId("curve"), {x: {name: "energy", label: "energy", most: Math.max(most, energy)}, y: {name: "peak_force", label: "peak force", most: 1.1 * (level && level.value < 2 * top ? Math.max(top, level.value) : top)},
+      lines: [{kind: "now", x: n => energies[n], y: peaks}], marks: [{x: energy, y: now.reached}], level,
+      words: `Peak force against energy; the impact has ${quantity("energy", energy)}${found ? `, the threshold is reached at ${quantity("energy", found)}` : ""}`});
+  }
+  byId("chance").hidden = !(now.limit > 0);
+  if (shown.draws) histogram(shown.draws, chance);
+  else {
+    byId("draws").replaceChildren();
+    byId("probability").textContent = Object.values(state.scatter).some(size => size > 0) ? "being computed" : "Give the energy, k or G_IIc a scatter to see how sure the answer is.";
+  }
+  table(byId("trust"), ["quantity", "size", "verdict", "why"], rows.map(one => [one.quantity, one.size, element("span", {class: `mark ${tag(one.level)}`}, one.level), one.words]));
+  table(byId("numbers"), ["quantity", "now", ...pins.map((_, n) => `pinned ${n + 1}`)],
+    SHOWN.map(name => [data.labels[name], ...[now, ...pins.map(pin => pin.result)].map(result => cell(name, result[name]))])
+      .concat(now.limit > 0 ? [["delamination threshold", ...[now, ...pins.map(pin => pin.result)].map(result => cell("peak_force", result.limit))],
+        ["energy from which it delaminates", cell("energy", found ?? NaN), ...pins.map(pin => cell("energy", pin.found ?? NaN))],
+        ...(chance === null ? [] : [["chance that it delaminates", element("data", {value: chance}, digits(chance, 3)), ...pins.map(() => "")]])] : []));
+  byId("commands").classList.toggle("pending", Boolean(work));
+  if (!work) commands(chance !== null); // once the page has answered
+}
+
+const cell = (name, value) => element("data", {value: String(value)}, name === "contacts" ? String(value) : quantity(name, value));
+const curveOf = result => ({x: n => (n + 1) * result.dt, y: result.force.map(force => force * first.strike.factor)});
+
+function table(at, head, rows) {
+  at.replaceChildren(element("thead", {}, element("tr", {}, ...head.map(text => element("th", {scope: "col"}, text)))),
+    element("tbody", {}, ...rows.map(([label, ...cells]) => element("tr", {}, element("th", {scope: "row"}, label), ...cells.map(part => element("td", {}, part))))));
+}
+
+function histogram({ratios, open}, chance) {
+  const most = Math.max(1.3, ...ratios) * 1.02, size = most / 40, counts = new Array(40).fill(0);
+  for (const ratio of ratios) counts[Math.min(39, Math.floor(ratio / size))]++;
+  const count = ratios.length, error = Math.sqrt(chance * (1 - chance) / count), bound = digits(3 / count, 2); // 95 %
+  const size95 = chance === 0 ? `below ${bound}` : chance === 1 ? `above ${1 - bound}` : `${digits(chance, 3)} ± ${digits(error, 1)}`;
+  const text = `Chance ${size95}: ${Math.round(chance * count)} of ${count} random impacts delaminate${open ? `, ${open} are open` : ""}.`;
+  byId("probability").textContent = text;
+  chart(byId("draws"), {x: {name: "none", label: "peak force over the threshold", most}, y: {name: "none", label: "impacts", most: 1.1 * Math.max(...counts)},
+    bars: counts.map((count, n) => ({from: n * size, to: (n + 1) * size, height: count, kind: n * size >= 1 - size / 2 ? "above" : ""})), level: {of: "x", value: 1}, words: text});
+}
+data.units.none = ["", "", 0];
+
+// Commands ------------------------------------------------------------------------------------------------------
+
+const quoted = text => /^[\w@%+=:,.\/-]+$/.test(text) && !text.startsWith("-") ? text : `'${text.replaceAll("'", "'\\''")}'`;
+
+/** Options that give the state, without the names left out. */
+function options(out = []) {
+  const {velocity} = impactOf(state), values = {}, plate = plateOf(state), steps = plate.program;
+  if (state.speed === "energy") values.energy = state.energy; else values.velocity = velocity;
+  if (state.mass !== atRest.mass) values.mass = state.mass;
+  if (state.law === "radius") values.radius = state.radius; else if (state.k !== atRest.k) values.k = state.k;
+  if (state.giic !== atRest.giic) values.giic = state.giic;
+  // The page goes on for longer than the program of the deck, where the impact does.
+  if (steps < kernel.steps && !names.includes("duration")) {
+    const [result] = kernel.run([impactOf(state)], steps);
+    if (!result.over || isNaN(result.max_deflection)) values.duration = Number((kernel.steps * kernel.dt).toPrecision(6));
+  }
+  const all = [...Object.entries(values).filter(([name]) => !out.includes(name)), ...names.map(name => [name, state.plate[name]])];
+  return all.map(([name, value]) => `--vary ${quoted(`${name}=${value}`)}`).join(" ");
+}
+
+function commands(withChance) {
+  const {name} = data.deck, out = quoted(name.replace(/(\.[^.]*)?$/, "-explored.h5").replace(/^.*[/\\]/, ""));
+  const parts = (more, left) => ["fecm sweep", quoted(name), options(left), more, `-o ${out} --overwrite`].filter(Boolean).join(" ");
+  const list = [["this impact", parts("--measure max_deflection")]];
+  if (now.limit > 0) list.push(["the energy from which it delaminates", parts("--find velocity --until peak_force=threshold", ["energy", "velocity"])]);
+  if (withChance && state.law === "k") {
+    const {velocity, mass, k, giic} = impactOf(state), values = {energy: energyOf({...plateOf(state).strike, mass}, velocity), k, giic};
+    const random = Object.entries(state.scatter).filter(([, size]) => size > 0);
+    list.push(["the chance, with draws of its own", parts(`${random.map(([key, size]) => `--random ${key}=lognormal:${values[key]},${size / 100}`).join(" ")} --samples ${DRAWS} --exceed peak_force=threshold`,
+      random.map(([key]) => key).concat(random.some(([key]) => key === "energy") ? ["velocity"] : []))]);
+  }
+  byId("commands").replaceChildren(...list.map(([label, text], n) => {
+    const pre = element("pre", {id: `command-${n}`, tabindex: "0"}, text), button = element("button", {type: "button", "aria-label": `Copy the command of ${label}`}, "Copy");
+    button.addEventListener("click", async () => {
+      getSelection().selectAllChildren(pre);
+      try { await navigator.clipboard.writeText(text); button.textContent = "Copied"; } catch { button.textContent = "Selected"; }
+    });
+    return element("div", {class: "command"}, element("p", {}, `For ${label}:`), pre, button);
+  }));
+}
+
+// State in the address and in files -----------------------------------------------------------------------------
+
+const kept = () => ({...state, pins: state.pins.map(pin => ({state: pin.state}))});
+
+/** Write the state into the address; pages in a frame have none. */
+function keep() {
+  try { history.replaceState(null, "", `#${encodeURIComponent(JSON.stringify({...kept(), pins: []}))}`); } catch { /* as in a notebook */ }
+}
+
+/** Take values of a state that have the right types; others stay those of the deck. */
+function take(given) {
+  if (!given || typeof given !== "object") return;
+  const positive = value => typeof value === "number" && Number.isFinite(value) && value > 0;
+  for (const name of ["energy", "velocity", "height", "mass", "k", "radius", "giic"]) if (positive(given[name]) && state[name] !== null) state[name] = given[name];
+  if (!first.strike.scales) state.mass = atRest.mass;
+  if (["energy", "velocity", "height"].includes(given.speed) && positive(given[given.speed]) && (given.speed !== "height" || data.gravity)) state.speed = given.speed;
+  if (given.law === "radius" && first.strike.unitK && positive(given.radius)) state.law = "radius";
+  for (const name of Object.keys(state.scatter)) {
+    const size = given.scatter?.[name];
+    if (typeof size === "number" && size >= 0 && size <= 1000) state.scatter[name] = size;
+  }
+  const plate = data.plates.find(one => names.every(name => one.values[name] === given.plate?.[name]));
+  if (plate) state.plate = plate.values;
+  for (const pin of Array.isArray(given.pins) ? given.pins.slice(0, PINS) : []) addPin(pin?.state);
+}
+
+/** Compute the impact of a state and keep its curve. */
+function addPin(given) {
+  const before = state;
+  state = structuredClone(atRest);
+  take({...given, pins: []});
+  const plate = plateOf(state);
+  before.pins.push({state, result: kernel.load(plate).one(impactOf(state, plate)), found: null});
+  state = before;
+}
+
+function download(name, type, text) {
+  const link = element("a", {href: URL.createObjectURL(new Blob([text], {type})), download: name});
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+const stem = data.deck.name.replace(/^.*[/\\]/, "").replace(/\.[^.]*$/, "");
+const head = (name, label) => data.units[name][0] ? `${label} (${data.units[name][0]})` : label;
+const measured = data.measured && {name: data.measured.name, time: doubles(data.measured.time), force: doubles(data.measured.force)};
+
+async function start() {
+  const {instance} = await WebAssembly.instantiate(bytes(byId("kernel").textContent), {});
+  kernel = new Kernel(instance.exports);
+  kernel.load(first);
+  take(JSON.parse(byId("state").textContent));
+  try { take(JSON.parse(decodeURIComponent(location.hash.slice(1)))); } catch { /* no state in the address */ }
+  byId("about").textContent = `Linear plate, ${kernel.steps} steps of ${quantity("time", kernel.dt)}. Every force is computed in this page by the kernel of fecm.`;
+  byId("notes").replaceChildren(...(data.notes.length ? [element("h3", {}, names.length ? "Notes of the run of the deck as it is" : "Notes of the deck's own run"), element("ul", {}, ...data.notes.map(text => element("li", {}, text)))] : []));
+  byId("own-run").hidden = true;
+  byId("page").hidden = false;
+  byId("pin").addEventListener("click", () => {
+    if (state.pins.length === PINS) state.pins.shift();
+    state.pins.push({state: {...structuredClone({...state, pins: []})}, result: now, found: shown.found});
+    draw();
+  });
+  byId("reset").addEventListener("click", () => { state = structuredClone(atRest); build(); changed(); });
+  byId("curve").addEventListener("click", event => {
+    if (!byId("curve").toValue) return;
+    const value = byId("curve").toValue(event);
+    if (!(value > 0)) return;
+    state.speed = "energy"; state.energy = Number(value.toPrecision(3)); build(); changed();
+  });
+  byId("save-csv").addEventListener("click", () => download(`${stem}-force.csv`, "text/csv",
+    `${head("time", "time")},${head("peak_force", "force")}\n${Array.from(curveOf(now).y, (force, n) => `${(n + 1) * now.dt},${force}\n`).join("")}`));
+  byId("save-deck").addEventListener("click", () => download(data.deck.name.replace(/^.*[/\\]/, ""), "text/plain", data.deck.text));
+  byId("save-page").addEventListener("click", () => {
+    const text = JSON.stringify(kept()).replaceAll("<", "\\u003c");
+    download(`${stem}.html`, "text/html", `<!DOCTYPE html>\n${source.replace(/(<script type="application\/json" id="state">)[^<]*/, (_, tagged) => tagged + text)}`);
+  });
+  addEventListener("resize", () => draw());
+  addEventListener("beforeprint", () => draw());
+  build();
+  changed();
+}
+
+start().catch(error => { byId("own-run").hidden = false; byId("page").hidden = true; byId("own-run").append(element("p", {}, String(error))); });

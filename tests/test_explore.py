@@ -1,0 +1,321 @@
+"""Pages on which an impact follows sliders: what is refused, what is in them, and their numbers."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+import shlex
+import time
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.authoring.case import CasesError
+from fecm.exploration.page import page, script_json
+from tests.browser import Browser, find_browser
+from tests.calls import call
+from tests.decks import small
+
+HELD = fecm.examples.path("drop-weight-held.inp")
+HOSTILE = (
+    "</script><script>alert(1)</script><img src=http://a.invalid/x onerror=alert(2)> {{kernel}}"
+)
+
+
+def units(deck: str) -> str:
+    """A deck in mm, N and s."""
+    return deck.replace("EXPE", "UNIT\nmm N s\nEXPE", 1)
+
+
+class Elements(HTMLParser):
+    """Scripts of a page, with their attributes and texts, and names of all elements."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.scripts: list[tuple[dict[str, str | None], str]] = []
+        self.names: list[str] = []
+        self.addresses: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Keep the name and the addresses of an element."""
+        self.names.append(tag)
+        self.addresses += [value or "" for name, value in attrs if name in ("src", "href")]
+        if tag == "script":
+            self.scripts.append((dict(attrs), ""))
+
+    def handle_data(self, data: str) -> None:
+        """Keep the text of a script."""
+        if self.scripts and self.names[-1] == "script" and not self.scripts[-1][1]:
+            self.scripts[-1] = (self.scripts[-1][0], data)
+
+
+def drawn(title: str) -> str:
+    """A page of data that only has a title."""
+    return page({"title": title}, np.arange(1.0, 4.0), np.array([1.0, 2.0, 0.5]))
+
+
+def test_a_hostile_title_is_text_of_the_page_and_no_element() -> None:
+    fair, hostile = Elements(drawn("plate")), Elements(drawn(HOSTILE))
+    assert hostile.names == fair.names
+    assert [address[:5] for address in hostile.addresses] == ["data:"]
+    (data,) = (text for about, text in hostile.scripts if about.get("id") == "data")
+    assert json.loads(data)["title"] == HOSTILE
+    assert "<" not in data
+
+
+def test_no_text_in_the_data_ends_their_element() -> None:
+    assert "<" not in script_json({"<!--": ["</script>", "<script>"]})
+    assert json.loads(script_json({"<!--": "</script>"})) == {"<!--": "</script>"}
+
+
+def test_the_policy_allows_the_script_and_the_style_of_the_page_alone() -> None:
+    text = drawn("plate")
+    (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', text)
+    (script,) = (body for about, body in Elements(text).scripts if not about)
+    (style,) = re.findall(r"<style>(.*?)</style>", text, re.S)
+    for kind, body in (("script", script), ("style", style)):
+        digest = base64.b64encode(hashlib.sha256(body.encode()).digest()).decode()
+        assert re.search(rf"{kind}-src 'sha256-{re.escape(digest)}'", policy)
+    assert "default-src 'none'" in policy
+    assert not re.search(
+        "https?:|unsafe-inline|unsafe-eval'", policy.replace("wasm-unsafe-eval", "")
+    )
+
+
+@pytest.mark.parametrize(
+    ("deck", "vary", "words"),
+    [
+        (small().replace("ROD\n", "UNIL\n13,0,1,0.,0.\n\nROD\n", 1), None, "has UNIL"),
+        (small(), "k=1e5,2e5", "k does not change the plate"),
+        (small().replace("RODP", "EXCD\nRODP", 1), None, "other steps"),
+    ],
+)
+def test_what_a_page_cannot_superpose_is_refused_before_anything_is_computed(
+    deck: str, vary: str | None, words: str
+) -> None:
+    with pytest.raises(fecm.ExploreError, match=words):
+        fecm.explore(deck, vary)
+
+
+def test_a_wrong_name_and_another_suffix_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(CasesError, match="cannot be varied"):
+        fecm.explore(small(), "ply_thicknes=.1,.2")
+    with pytest.raises(fecm.ExploreError, match=r"written as \.html"):
+        fecm.explore(small()).save(tmp_path / "page.txt")
+
+
+# In a browser -------------------------------------------------------------------------------------
+
+SHOWN = (
+    "peak_force", "time_of_peak", "contacts", "contact_time", "max_deflection", "max_indentation",
+    "permanent_indentation", "impulse", "rebound_velocity", "energy_absorbed", "contact_loop",
+)  # fmt: skip
+
+
+NEW = {
+    "thin": '--fixture D7136 --window held --layup "[45/0/-45/90]2s" --material IM7/8552 '
+    "--ply-thickness .131 --damage --energy 2J --kinematics linear",
+    "sandwich": "--size 100x100 --mesh 12x12 --support simple --layup '[0/90/K/90/0]' "
+    "--material IM7/8552 --ply-thickness .25 --core Divinycell-H60:10 --shear-factor equi --damage "
+    "--projectile mass:1e-3 --law 3e3,0,0,1.5 --energy 2J --duration 2ms --kinematics linear",
+    "curved": "--size 300x200 --mesh 20x14 --radius-x 500 --support simple "
+    "--layup '[0/90/0/90/0]s' --material IM7/8552 --ply-thickness .2 --units mm-N-s "
+    "--projectile mass:2e-5 --law 5e4,0,0,1.5 --patch disc:4 --velocity 3m/s "
+    "--duration .7ms --kinematics linear",
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Decks of all kinds of plates and projectiles, and their pages."""
+    place = tmp_path_factory.mktemp("pages")
+    for name, options in NEW.items():
+        done = call("new", f"{name}.inp", *shlex.split(options), cwd=place)
+        assert done.exit_code == 0, done.stderr
+    (place / "d7136.inp").write_text(HELD.read_text())
+    (place / "rod.inp").write_text(Path("decks/impact-115.inp").read_text())
+    for name in ("d7136", "rod", *NEW):
+        done = call("explore", f"{name}.inp", "-o", f"{name}.html", cwd=place)
+        assert done.exit_code == 0, done.stderr
+    return place
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A headless browser."""
+    program = find_browser()
+    if program is None:
+        pytest.skip("no Chromium or Chrome found")
+    with Browser(program, tmp_path_factory.mktemp("profile")) as actual:
+        yield actual
+
+
+def settled(browser: Browser) -> None:
+    """Wait until the page has answered all sliders."""
+    while browser.value("document.body?.dataset.ready") != "true":
+        time.sleep(0.05)
+
+
+def visit(browser: Browser, page: Path, address: str) -> None:
+    """Open a page with an address of a state."""
+    browser.open(page)
+    browser.value(f"location.hash = {json.dumps(address)}; location.reload()")
+    time.sleep(0.3)
+    settled(browser)
+
+
+def set_values(browser: Browser, **values: float | str) -> None:
+    """Type values, in the units that the page shows, or choose options."""
+    for name, value in values.items():
+        browser.value(
+            f"""(() => {{
+                const field = document.getElementById({json.dumps(name)});
+                field.value = {json.dumps(str(value))};
+                field.dispatchEvent(new Event(field.tagName === "SELECT" ? "change" : "input"));
+            }})()"""
+        )
+    settled(browser)
+
+
+def numbers(browser: Browser) -> dict[str, float]:
+    """Values of the page with all their digits, by name."""
+    values = browser.value("SHOWN.map(name => [name, String(now[name])])")
+    found = browser.value("String(shown.found)")
+    return {
+        **{name: float(text) for name, text in values},
+        "found": float(found.replace("null", "nan")),
+    }
+
+
+def commands(browser: Browser) -> list[str]:
+    """Commands that the page shows."""
+    shown: list[str] = browser.value(
+        "[...document.querySelectorAll('#commands pre')].map(one => one.textContent)"
+    )
+    return shown
+
+
+def swept(command: str, folder: Path) -> dict[str, Any]:
+    """Results of a command, as JSON."""
+    program, *arguments = shlex.split(command)
+    assert program == "fecm"
+    done = call(*arguments, "--format", "json", "--allow-failed", cwd=folder)
+    assert done.exit_code == 0, done.stderr
+    results: dict[str, Any] = json.loads(done.stdout)["results"]
+    return results
+
+
+def to_four_digits(actual: float, wanted: object) -> bool:
+    """Whether two values agree to half a unit of the fourth digit, or are both open."""
+    value = float(str(wanted))
+    return (np.isnan(actual) and np.isnan(value)) or abs(actual - value) <= 5e-5 * abs(
+        value
+    ) + 1e-12
+
+
+STATES: dict[str, list[dict[str, float | str]]] = {
+    "d7136": [{}, {"energy-value": 3.2, "mass-value": 8, "k-value": 6e4, "giic-value": 0.6}],
+    "thin": [{"choose-law": "radius", "radius-value": 12, "energy-value": 0.9}],
+    "rod": [{"choose-speed": "velocity", "velocity-value": 80.0}],
+    "sandwich": [{"mass-value": 2.5}],
+    "curved": [{"energy-value": 0.25}],
+}
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("name", STATES)
+def test_numbers_of_the_page_are_those_of_the_commands_that_it_shows(
+    name: str, folder: Path, browser: Browser
+) -> None:
+    for values in STATES[name]:
+        browser.open(folder / f"{name}.html")
+        settled(browser)
+        set_values(browser, **values)
+        actual, (impact, *others) = numbers(browser), commands(browser)
+        wanted = swept(impact, folder)
+        assert actual["peak_force"] > 0.0
+        for quantity in SHOWN:
+            assert to_four_digits(actual[quantity], wanted[quantity][0]), quantity
+        if others:
+            found = swept(others[0], folder)["found_energy"][0]
+            assert to_four_digits(actual["found"], found)
+        assert browser.complaints() == []
+        assert browser.requests() == [(folder / f"{name}.html").as_uri()]
+
+
+@pytest.mark.browser
+def test_the_chance_is_that_of_a_random_sweep(folder: Path, browser: Browser) -> None:
+    browser.open(folder / "d7136.html")
+    settled(browser)
+    set_values(
+        browser,
+        **{
+            "energy-value": 4.2,
+            "scatter-energy-value": 3,
+            "scatter-k-value": 20,
+            "scatter-giic-value": 10,
+        },
+    )
+    chance = browser.value(
+        "shown.draws.ratios.filter(ratio => ratio >= 1).length / shown.draws.ratios.length"
+    )
+    _, _, command = commands(browser)
+    done = call(*shlex.split(command)[1:], "--format", "json", cwd=folder)
+    assert done.exit_code == 0, done.stderr
+    (wanted,) = json.loads(done.stdout)["random"]["exceedance"]["probability"]
+    assert 0.05 < chance < 0.95
+    assert abs(chance - wanted) <= 2.0 * np.sqrt(2.0 * chance * (1.0 - chance) / 1000)
+
+
+@pytest.mark.browser
+def test_a_saved_page_and_an_address_have_the_state_and_its_pinned_curves(
+    folder: Path, browser: Browser, tmp_path: Path
+) -> None:
+    browser.open(folder / "d7136.html")
+    settled(browser)
+    browser.value("document.getElementById('pin').click()")
+    set_values(browser, **{"energy-value": 4, "mass-value": 7})
+    peak = numbers(browser)["peak_force"]
+    browser.value(
+        "var saved; download = (name, type, text) => { saved = text; }; "
+        "document.getElementById('save-page').click()"
+    )
+    page = tmp_path / "saved.html"
+    page.write_text(browser.value("saved"), encoding="utf-8")
+    address = browser.value("location.hash")
+    browser.open(page)
+    settled(browser)
+    assert numbers(browser)["peak_force"] == peak
+    assert browser.value("document.querySelectorAll('#force .pin1').length") == 2  # with its label
+    assert browser.complaints() == []
+    visit(browser, folder / "d7136.html", address)
+    assert numbers(browser)["peak_force"] == peak
+
+
+@pytest.mark.browser
+def test_hostile_texts_of_a_deck_and_of_an_address_stay_texts(
+    browser: Browser, tmp_path: Path
+) -> None:
+    deck = units(small()).replace("FECM small plate", f"FECM {HOSTILE}")
+    path = tmp_path / "a' $(touch b) <b>.inp"
+    path.write_text(deck)
+    fecm.explore(path).save(tmp_path / "page.html")
+    for address in ("", "%", "[]", quote('{"energy":"<b>","pins":5,"scatter":7,"plate":null}')):
+        visit(browser, tmp_path / "page.html", f"#{address}")
+        assert browser.value("document.querySelector('h1').textContent") == HOSTILE
+        assert browser.value("document.querySelectorAll('img, script, b').length") == 5
+    assert {address.partition("#")[0] for address in browser.requests()} == {
+        (tmp_path / "page.html").as_uri()
+    }
+    (command, *_) = commands(browser)
+    assert shlex.split(command)[2] == path.name
+    assert browser.value("now.peak_force > 0 || now.reached > 0")
