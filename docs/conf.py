@@ -198,6 +198,15 @@ def _literally(app: Any, context: Any, lines: list[str]) -> None:
     lines[:] = [re.sub(r"[|*]|(?<=:)//", r"\\\g<0>", line) for line in lines]
 
 
+def _explored(app: Any) -> None:
+    """Write the page with sliders that the front page shows."""
+    import fecm
+
+    page = Path(__file__).parent / "_static" / "explore" / "drop-weight.html"
+    page.parent.mkdir(exist_ok=True)
+    fecm.explore(fecm.examples.path("drop-weight-held.inp")).save(page, overwrite=True)
+
+
 def setup(app: Any) -> None:
     """Register the renderer of equations, and correct help texts."""
     app.connect("doctree-read", _wrap_output)
@@ -206,4 +215,5 @@ def setup(app: Any) -> None:
         app.connect(f"sphinx-click-process-{part}", _literally)
     app.connect("doctree-read", _captions)
     app.connect("builder-inited", scraper.draw_thumbnails, priority=900)  # after the gallery
+    app.connect("builder-inited", _explored)
     app.add_html_math_renderer("mathml", (_mathml, None), (_mathml, None))

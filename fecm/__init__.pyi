@@ -19,7 +19,6 @@ from fecm.deck.model import Deck as Deck
 from fecm.deck.model import Ply as Ply
 from fecm.deck.reader import read_deck as read_deck
 from fecm.exploration.explore import Exploration as Exploration
-from fecm.exploration.explore import ExploreError as ExploreError
 from fecm.exploration.explore import explore as explore
 from fecm.identification.edges import EdgeFit as EdgeFit
 from fecm.identification.edges import fit_edges as fit_edges

@@ -17,6 +17,7 @@ from fecm.deck.findings import DeckError
 from fecm.deck.layup import LayupError
 from fecm.deck.macros import RowsError
 from fecm.deck.units import UnitsError
+from fecm.exploration.explore import ExploreError
 from fecm.identification.alignment import IdentifyError
 from fecm.location.location import LocateError
 from fecm.mechanics.failure import CriterionError
@@ -50,6 +51,7 @@ __all__ = [
     "DamagedPartError",
     "DeckError",
     "DivergenceError",
+    "ExploreError",
     "ExportError",
     "ExtensionError",
     "FecmError",

@@ -102,14 +102,14 @@ def test_the_policy_allows_the_script_and_the_style_of_the_page_alone() -> None:
 def test_what_a_page_cannot_superpose_is_refused_before_anything_is_computed(
     deck: str, vary: str | None, words: str
 ) -> None:
-    with pytest.raises(fecm.ExploreError, match=words):
+    with pytest.raises(fecm.errors.ExploreError, match=words):
         fecm.explore(deck, vary)
 
 
 def test_a_wrong_name_and_another_suffix_are_refused(tmp_path: Path) -> None:
     with pytest.raises(CasesError, match="cannot be varied"):
         fecm.explore(small(), "ply_thicknes=.1,.2")
-    with pytest.raises(fecm.ExploreError, match=r"written as \.html"):
+    with pytest.raises(fecm.errors.ExploreError, match=r"written as \.html"):
         fecm.explore(small()).save(tmp_path / "page.txt")
 
 

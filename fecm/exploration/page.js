@@ -235,7 +235,7 @@ function chart(svg, {x, y, lines = [], marks = [], level, bars = [], words}) {
     if (level.band && level.band[0] < level.band[1]) {
       const [low, high] = level.band.map(toY);
       add("rect", {class: "band", x: left, y: high, width: width - left - right, height: low - high});
-      add("text", {class: "of-level", x: width - right - 4, y: low - 5, "text-anchor": "end"}, "delamination of each interface");
+      add("text", {class: "of-level", x: (left + width - right) / 2, y: low - 5, "text-anchor": "middle"}, "delamination of each interface");
     }
     add("path", {class: "level", d: `M${left} ${one(toY(level.value))}H${width - right}`});
     add("text", {class: "of-level", x: width - right - 4, y: toY(level.value) - 5, "text-anchor": "end"}, level.label);
@@ -486,7 +486,7 @@ function draw() {
   lines.push({kind: "now", label: lines.length ? "now" : "", ...curveOf(now)});
   const last = Math.max(now.contactEnd, ...pins.map(pin => pin.result.contactEnd), measured ? Math.min(measured.time.at(-1), 2 * now.contactEnd) : 0);
   const highest = Math.max(now.reached, ...pins.map(pin => pin.result.reached), ...(measured?.force ?? []), 1e-300);
-  chart(byId("force"), {x: {name: "time", label: "time", most: 1.08 * last || 1}, y: {name: "peak_force", label: "contact force", most: 1.1 * (level && level.value < 3 * highest ? Math.max(highest, level.value) : highest)},
+  chart(byId("force"), {x: {name: "time", label: "time", most: 1.08 * last || 1}, y: {name: "peak_force", label: "contact force", most: (lines.length > 1 ? 1.35 : 1.1) * (level && level.value < 3 * highest ? Math.max(highest, level.value) : highest)},
     lines, level: level && {...level, band}, words: `Contact force over time: peak ${quantity("peak_force", now.peak_force)} at ${quantity("time_of_peak", now.time_of_peak)}`});
   if (shown.curve) {
     const {energies, peaks, most} = shown.curve, top = Math.max(...peaks);
