@@ -121,26 +121,29 @@ OTHER_PLATES: dict[str, tuple[Callable[[], fecm.Deck], Literal["report", "listin
 }
 
 
+# A quarter has the lines of both halves.
+@pytest.mark.parametrize(
+    "part", [pytest.param(part, marks=[pytest.mark.long] * (part != "quarter")) for part in PARTS]
+)
 @pytest.mark.parametrize("plate", OTHER_PLATES)
-def test_every_kind_of_plate_has_parts_with_the_numbers_of_the_whole(plate: str) -> None:
+def test_every_kind_of_plate_has_parts_with_the_numbers_of_the_whole(plate: str, part: str) -> None:
     build, mode = OTHER_PLATES[plate]
-    deck = build()
-    whole = fecm.run_one(deck, mode=mode)
-    codes = {finding.code for finding in load_deck(deck).findings}
-    for axes in PARTS.values():
-        part = part_of(deck, axes)
-        result = fecm.run_one(part, mode=mode)
-        assert result.symmetry_factor == 2 ** len(axes)
-        assert result.metrics == pytest.approx(whole.metrics, rel=1e-9, abs=1e-12, nan_ok=True)
-        assert result.whole("force") == pytest.approx(whole.force, abs=1e-9 * whole.force.max())
-        assert result.end == whole.end
-        notes, expected = ([n.split(" at (")[0] for n in one.notes] for one in (result, whole))
-        assert notes == expected
-        assert {finding.code for finding in load_deck(part).findings} == codes
-        exposures, expected_exposures = (largest_exposures(one) for one in (result, whole))
-        for one, of_whole in zip(exposures, expected_exposures, strict=True):
-            assert one.exposure == pytest.approx(of_whole.exposure, rel=1e-9)
-            assert one.band == pytest.approx(of_whole.band, rel=1e-9)
+    deck, axes = build(), PARTS[part]
+    whole, result = fecm.run_one(deck, mode=mode), fecm.run_one(part_of(deck, axes), mode=mode)
+    assert result.symmetry_factor == 2 ** len(axes)
+    assert result.metrics == pytest.approx(whole.metrics, rel=1e-9, abs=1e-12, nan_ok=True)
+    assert result.whole("force") == pytest.approx(whole.force, abs=1e-9 * whole.force.max())
+    assert result.end == whole.end
+    notes, expected = ([n.split(" at (")[0] for n in one.notes] for one in (result, whole))
+    assert notes == expected
+    codes, expected_codes = (
+        {finding.code for finding in load_deck(one).findings} for one in (part_of(deck, axes), deck)
+    )
+    assert codes == expected_codes
+    exposures, expected_exposures = (largest_exposures(one) for one in (result, whole))
+    for one, of_whole in zip(exposures, expected_exposures, strict=True):
+        assert one.exposure == pytest.approx(of_whole.exposure, rel=1e-9)
+        assert one.band == pytest.approx(of_whole.band, rel=1e-9)
 
 
 def test_the_rim_of_half_a_window_is_outside_the_supports_which_pull_as_those_of_the_whole() -> (

@@ -191,12 +191,12 @@ def estimate(deck: str | Path | Deck) -> Estimate:
     Examples
     --------
     >>> import fecm
-    >>> result = fecm.estimate(fecm.examples.path("drop-weight"))
+    >>> result = fecm.estimate(fecm.examples.path("drop-weight-held"))
     >>> result.response
     'quasi-static: the static plate applies, which underestimates the force by about 10 %'
     >>> static, run = result.models["static plate"], result.models["run"]
     >>> print(f"{static.peak_force:.0f} and {run.peak_force:.0f} {result.units['force']}")
-    4575 and 4700 N
+    4648 and 4787 N
     """
     result = estimate_problem(sole_problem(deck))
     warn(*result.notes)
