@@ -174,7 +174,7 @@ def test_a_quarter_of_a_plate_has_the_symmetric_modes_of_the_whole() -> None:
 
 def test_the_lines_of_a_window_and_its_rim_are_not_counted() -> None:
     deck = fecm.impact(
-        fecm.Plate.on_fixture("D7136"),
+        fecm.Plate.on_fixture("D7136", mesh=(12, 8)),
         fecm.Laminate("[0/90]6s", PLY, 0.18),
         fecm.RigidMass(5e-3),
         model.Indentation(5e4, 1e6, 0.1, 1.5),

@@ -686,7 +686,7 @@ def test_half_of_a_plate_on_one_sided_supports_is_the_whole(
         assert np.abs(half[path] - whole[path]).max() < 1e-10 * np.abs(whole[path]).max()
 
 
-@pytest.mark.parametrize("clamps", ["held", 2000.0])
+@pytest.mark.parametrize("clamps", [pytest.param("held", marks=pytest.mark.long), 2000.0])
 def test_the_window_of_a_graded_mesh_leaves_half_of_the_plate(clamps: str | float) -> None:
     deck = fecm.impact(
         fecm.Plate.on_fixture("D7136", window="push", clamps=clamps, mesh=(20, 12)),
