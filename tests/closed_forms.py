@@ -441,6 +441,9 @@ EXPECTED: dict[str, Sequence[float | None]] = {
     "rigid-target": (
         *hertz_impact(2.0e-4, 100.0, 1.0e6), *acr_impact(2.0e-4, 100.0, 1.0e6, 1.2e-3)
     ),
+    "webassembly": (
+        *hertz_impact(2.0e-4, 100.0, 1.0e6), *acr_impact(2.0e-4, 100.0, 1.0e6, 1.2e-3)
+    ),
     "free-plate": two_bodies(3e-4),
     "patch-compliance": (
         *(compliance(*CROSS, (6.0, 4.0), shape, 0.5) for shape in (disc, hertz)), None, None,

@@ -7,6 +7,7 @@ sources, and the tolerances with their reasons.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from importlib.util import find_spec
 
 from fecm._errors import FecmError
 from fecm.verification import (  # noqa: F401  (importing them fills CASE_OF)
@@ -18,12 +19,18 @@ from fecm.verification import (  # noqa: F401  (importing them fills CASE_OF)
     stretching,
     studies,
     supports,
+    webassembly,
 )
 from fecm.verification.case import CASE_OF, TABLES, Case, Row, compute_rows
 
 __all__ = ["CASES", "Case", "Row", "UnknownCaseError", "chosen", "compute_rows", "verify"]
 
-CASES: tuple[Case, ...] = tuple(CASE_OF[name] for name in TABLES)
+# A case that needs a library which is not installed runs if it is asked for by name, and fails.
+CASES: tuple[Case, ...] = tuple(
+    case
+    for case in map(CASE_OF.__getitem__, TABLES)
+    if not case.needs or find_spec(case.needs) is not None
+)
 
 
 class UnknownCaseError(FecmError, LookupError, ValueError):
@@ -36,7 +43,7 @@ def chosen(names: Iterable[str] = ()) -> list[Case]:
     for name in requested:
         if name not in CASE_OF:
             raise UnknownCaseError(f"unknown case {name}; the cases are {', '.join(TABLES)}")
-    return [candidate for candidate in CASES if not requested or candidate.name in requested]
+    return [CASE_OF[name] for name in TABLES if name in requested] if requested else [*CASES]
 
 
 def verify(*cases: str) -> list[Row]:

@@ -83,6 +83,7 @@ class Case(NamedTuple):
     title: str
     checks: tuple[Check, ...]
     compute: Compute
+    needs: str = ""  # optional library without which the case is left out
 
 
 class Row(NamedTuple):
@@ -151,13 +152,14 @@ def case(compute: Compute) -> Compute:
     name = compute.__name__[1:].replace("_", "-")
     common = dict(TABLES[name])
     title, groups = common.pop("title"), common.pop("checks")
+    needs = common.pop("needs", "")
     checks: list[Check] = []
     for group in groups:
         shared = common | group
         shared["label"] = Label(shared.get("label", Label.INDEPENDENT))
         expected = shared.pop("expected")
         checks += [Check(quantity, value, **shared) for quantity, value in expected.items()]
-    CASE_OF[name] = Case(name, title, tuple(checks), compute)
+    CASE_OF[name] = Case(name, title, tuple(checks), compute, needs)
     return compute
 
 

@@ -16,6 +16,7 @@ from fecm.mechanics.contact_law import (
 )
 from fecm.mechanics.impact import ImpactSystem
 from fecm.mechanics.plate_motion import PlateMotion
+from fecm.mechanics.projectile import RigidMass
 from fecm.problem import parts
 from fecm.results import metrics
 from tests.breaks import (
@@ -101,6 +102,10 @@ BREAKS: Breaks = {
         instead(ImpactSystem, "__init__", standing_plate),
         {"infinite-plate": ("",), "supported-plate": ("largest force",),
          "report-impact": ("worst",)},
+    ),
+    "half of the mass of a rigid projectile": (
+        changed(RigidMass, "mass", halved),
+        {"rigid-target": ("deepest", "largest", "contact"), "webassembly": ("",)},
     ),
     "a projectile that starts at w = 0": (
         in_numpy(instead(ImpactSystem, "advance", started_at_zero)),
