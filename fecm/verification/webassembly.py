@@ -74,7 +74,7 @@ class WasmKernel:
             self._exports["free"](self._store, at)
 
 
-def _rigid_target_hit(constants: ContactParameters[Floats]) -> list[float]:
+def _rigid_target_hit(constants: ContactParameters) -> list[float]:
     """Hit a fixed target with a rigid mass.
 
     Returns the deepest indentation, the largest force, the time of the contact, the velocity after
