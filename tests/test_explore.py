@@ -23,6 +23,7 @@ from fecm.exploration.page import page, script_json
 from tests.browser import Browser, find_browser
 from tests.calls import call
 from tests.decks import small
+from tests.test_browser import AA, BROKEN, COLOURS, _luminance, contrast
 
 HELD = fecm.examples.path("drop-weight-held.inp")
 HOSTILE = (
@@ -104,6 +105,14 @@ def test_what_a_page_cannot_superpose_is_refused_before_anything_is_computed(
 ) -> None:
     with pytest.raises(fecm.errors.ExploreError, match=words):
         fecm.explore(deck, vary)
+
+
+def test_plates_of_more_bytes_than_a_page_may_have_are_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("fecm.exploration.explore.MOST", 100)
+    with pytest.raises(fecm.errors.ExploreError, match="leave out values of `vary`"):
+        _ = fecm.explore(small()).html
 
 
 def test_a_wrong_name_and_another_suffix_are_refused(tmp_path: Path) -> None:
@@ -319,3 +328,83 @@ def test_hostile_texts_of_a_deck_and_of_an_address_stay_texts(
     (command, *_) = commands(browser)
     assert shlex.split(command)[2] == path.name
     assert browser.value("now.peak_force > 0 || now.reached > 0")
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1400])
+def test_the_page_fits_the_window_and_its_texts_are_legible(
+    folder: Path, browser: Browser, width: int, scheme: str
+) -> None:
+    browser.open(folder / "d7136.html", width=width, scheme=scheme)
+    settled(browser)
+    assert browser.value("document.documentElement.scrollWidth") == width
+    assert browser.value(BROKEN) == []
+    dark = scheme == "dark"
+    assert (
+        _luminance(browser.value("getComputedStyle(document.body).backgroundColor")) < 0.2
+    ) is dark
+    pairs = [pair.split("/") for pair in browser.value(COLOURS) if "none" not in pair]
+    assert len(pairs) > 3
+    assert min(contrast(text, paper) for text, paper in pairs) >= AA
+
+
+@pytest.mark.browser
+def test_the_keyboard_alone_moves_a_slider_and_pins_a_curve(folder: Path, browser: Browser) -> None:
+    browser.open(folder / "d7136.html")
+    settled(browser)
+    before = numbers(browser)["peak_force"]
+
+    def press(key: str) -> None:
+        for kind in ("rawKeyDown", "keyUp"):
+            code = {"Tab": 9, "ArrowRight": 39, "Enter": 13}[key]
+            text = {"text": "\r"} if key == "Enter" and kind == "rawKeyDown" else {}
+            kind = "keyDown" if text else kind
+            browser.do(
+                "Input.dispatchKeyEvent", type=kind, key=key, windowsVirtualKeyCode=code, **text
+            )
+
+    def reach(name: str) -> None:
+        for _ in range(40):
+            press("Tab")
+            if browser.value("document.activeElement.id") == name:
+                return
+        raise AssertionError(name)
+
+    reach("energy")
+    for _ in range(20):
+        press("ArrowRight")
+    settled(browser)
+    assert numbers(browser)["peak_force"] > 1.05 * before
+    assert browser.value("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+    reach("pin")
+    press("Enter")
+    assert browser.value("state.pins.length") == 1
+
+
+@pytest.mark.browser
+def test_without_scripts_the_page_says_so_and_shows_the_run_of_the_deck(
+    folder: Path, browser: Browser
+) -> None:
+    browser.do("Emulation.setScriptExecutionDisabled", value=True)
+    try:
+        browser.open(folder / "d7136.html")
+    finally:
+        browser.do("Emulation.setScriptExecutionDisabled", value=False)
+    assert browser.value("document.querySelector('#own-run img').naturalWidth") > 0
+    assert browser.value("document.querySelector('#page').hidden")
+
+
+@pytest.mark.browser
+def test_a_measured_force_and_several_plates_are_drawn(folder: Path, browser: Browser) -> None:
+    measured = (np.linspace(0.0, 4e-3, 50), 4000.0 * np.sin(np.linspace(0.0, np.pi, 50)))
+    page = fecm.explore(folder / "d7136.inp", {"ply_thickness": [0.184, 0.15]}, overlay=measured)
+    page.save(folder / "plates.html")
+    browser.open(folder / "plates.html")
+    settled(browser)
+    assert browser.value("document.querySelectorAll('#force .measured').length") == 2
+    set_values(browser, **{"plate-0": "0.15"})
+    actual, (command, *_) = numbers(browser), commands(browser)
+    assert "--vary ply_thickness=0.15" in command
+    wanted = swept(command, folder)
+    assert all(to_four_digits(actual[name], wanted[name][0]) for name in SHOWN)
