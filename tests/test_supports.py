@@ -31,8 +31,10 @@ from fecm.deck.model import (
     PointMasses,
     Springs,
 )
+from fecm.deck.units import unit_names
 from fecm.judge.limits import Judgement, TrustLevel
 from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.quick_models import static_curve
 from fecm.mechanics.solutions import modes, static_response
 from fecm.mechanics.stiffness_product import internal_force_operator
 from fecm.mechanics.supports import NodeSupports
@@ -45,9 +47,11 @@ from fecm.mechanics.symmetry import (
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.plot.mesh import Support, support_masks
 from fecm.problem import build
+from fecm.problem.estimates import whole_stiffness
 from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
 from fecm.problem.summary import deck_summary
+from fecm.problem.support_summary import support_rows
 from fecm.report.trust import deck_problem, judgements
 from fecm.results.summary import about_run, run_summary
 from tests import p_elements
@@ -71,6 +75,7 @@ def free_plate(mesh: tuple[int, int] = COARSE, layup: str = "QI24", **options: A
     """A plate of D7136 without supports, hit by 5.5 kg."""
     text, thickness = LAYUPS[layup]
     given: dict[str, Any] = {"shear_factor": 1.0, "velocity": 2696.8, "duration": 4e-3}
+    given["kinematics"] = "linear"
     return fecm.impact(
         fecm.Plate.rectangle(SIZE, mesh),
         fecm.Laminate(text, options.pop("ply", PLY), thickness),
@@ -78,7 +83,6 @@ def free_plate(mesh: tuple[int, int] = COARSE, layup: str = "QI24", **options: A
         model.Indentation(42090.3, 1e6, 0.1, 1.5),
         units="mm-N-s",
         patch="disc",
-        kinematics="linear",
         **{**given, **options},
     )
 
@@ -488,6 +492,8 @@ def test_what_needs_a_linear_plate_names_the_one_sided_supports(tmp_path: Path) 
         fecm.identify(deck, time, force, ["k"])
     with pytest.raises(fecm.FecmError, match="the deck has UNIL"):
         fecm.locate(deck, strains)
+    with pytest.raises(fecm.FecmError, match=r"UNIL.*full runs.*--window held"):
+        fecm.sweep(deck, {"velocity": [500.0, 1500.0]}, model="reduced")
 
 
 # Summary and pictures ----------------------------------------------------------------------------
@@ -597,9 +603,11 @@ MIDDLE = 213  # node in the middle of 12 x 8 elements
 OF_IMPACT = (model.Impact, model.Projectile, model.Indentation, model.Patch)
 
 
-def loaded_deck(words: Sequence[str], forces: model.Forces, *supports: model.Segment) -> Deck:
+def loaded_deck(
+    words: Sequence[str], forces: model.Forces, *supports: model.Segment, **options: Any
+) -> Deck:
     """The plate of 12 x 8 elements under forces, with supports and a program."""
-    deck = free_plate((12, 8))
+    deck = free_plate((12, 8), **options)
     kept = [segment for segment in deck.segments if not isinstance(segment, OF_IMPACT)]
     macros = [Macro(word[:4], value=float(word[4:] or 0)) for word in words]
     return replace(deck, segments=(*kept, forces, *supports), macros=tuple(macros), text="")
@@ -641,6 +649,42 @@ def test_static_deflections_are_proportional_to_the_force_on_supports_without_ga
     once, often = (deflections(pressed(f, MIDDLE), pushing((12, 8))) for f in (100.0, 700.0))
     assert once.min() < 0.0  # the corners lift off
     assert np.abs(7.0 * once - often).max() < 1e-12 * often.max()
+
+
+def test_the_curve_of_a_plate_that_stretches_on_a_window_that_only_pushes_is_its_statics() -> None:
+    options: dict[str, Any] = {"layup": "QI16", "kinematics": "von-karman"}
+    problem = problem_of(with_segments(free_plate((12, 8), **options), pushing((12, 8))))
+    contact, supports = problem.contact, problem.moving_plate.supports
+    assert contact is not None
+    assert supports is not None
+    curve = static_curve(problem.moving_plate, contact, 0.9, lambda w, _, __: w > 1.5)
+    deflection, force = curve.deflection[-1], curve.force[-1]
+    assert curve.stiffness[0] == pytest.approx(whole_stiffness(problem), rel=1e-6)
+    assert force > 1.05 * curve.stiffness[0] * deflection  # it stretches
+    cards = [
+        NodeValues(node, 0, (0.0, 0.0, load, 0.0, 0.0))
+        for node, load in enumerate((contact[:, 2] * force).tolist(), start=1)
+        if load
+    ]
+    deck = loaded_deck(SOLVED, model.Forces(tuple(cards)), pushing((12, 8)), **options)
+    w = run(deck)["tape3/w"][-1]
+    assert w[supports.node].min() < -0.01 * deflection  # and lifts off
+    assert contact[:, 2] @ w == pytest.approx(deflection, rel=1e-9)
+
+
+def test_static_estimates_say_that_they_leave_gaps_out() -> None:
+    touching, apart = (
+        with_segments(free_plate((12, 8), duration=1e-5), pushing((12, 8), gap=gap))
+        for gap in (0.0, 0.1)
+    )
+    at_once, later = fecm.estimate(touching), fecm.estimate(apart)
+    assert later.stiffness == at_once.stiffness
+    assert "leave out the gaps of UNIL" in later.remarks["gaps"]
+    assert "gaps" not in at_once.remarks
+    summary = deck_summary(problem_of(apart)).supports
+    assert summary is not None
+    (row,) = support_rows(summary, unit_names(apart))
+    assert "gap up to 0.1 mm, which static estimates leave out" in str(row)
 
 
 @pytest.mark.parametrize(("side", "gap"), [(1, 0.1), (-1, 0.0)])

@@ -21,11 +21,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecm._typing import Floats
+from fecm._typing import Bools, Floats
 from fecm.mechanics.membrane import MembraneForces
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.roots import root
-from fecm.mechanics.solutions import ConvergenceError, Tangent
+from fecm.mechanics.solutions import (
+    ConvergenceError,
+    HeldTangent,
+    SingularStiffnessError,
+    Tangent,
+)
 from fecm.mechanics.symmetry import symmetry_reduction
 
 # The iterations end at this change, relative to the displacement: force and work have its square.
@@ -86,7 +91,7 @@ def static_curve(
     ----------
     plate : PlateModel
         Plate without nodal forces and prescribed displacements.  Its rigid motion in the plane
-        needs no supports.
+        needs no supports.  One-sided supports have no gaps here.
     contact : ndarray (numnp, 5)
         Nodal forces of a unit contact force.
     step : float
@@ -134,7 +139,7 @@ class _Point(NamedTuple):
 
 def _equilibria(plate: PlateModel, contact: Floats, step: float) -> Iterator[_Point]:
     """Yield equilibria without end, starting at rest."""
-    path = _Path(plate, contact)
+    path = (_LiftingPath if plate.lifts else _Path)(plate, contact)
     load = path.load
     u, turn = np.zeros((2, len(load)))
     force, deflection, step_size = 0.0, 0.0, step
@@ -181,8 +186,6 @@ class _Path:
         self.load = reduction.gather(contact)
         self._stiffness = reduction.reduced(plate.stiffness, plate.mesh.equations > 0)
         self._membrane = MembraneForces(plate, reduction.weights.astype(float))
-        supports = plate.supports
-        self._lifting = None if supports is None else supports.select(supports.is_one_sided)
         self._factorise(np.zeros(reduction.count))
 
     def _factorise(self, u: Floats) -> None:
@@ -198,10 +201,7 @@ class _Path:
 
     def internal(self, u: Floats) -> Floats:
         """Return the internal forces f(u), (n,)."""
-        field = self._reduction.field(u)
-        forces, _ = self._membrane.forces(field)
-        if self._lifting is not None:
-            forces = forces + self._lifting.forces(field)
+        forces, _ = self._membrane.forces(self._reduction.field(u))
         return np.asarray(self._stiffness @ u + self._reduction.gather(forces))
 
     def equilibrium(self, u: Floats) -> Floats | None:
@@ -250,14 +250,8 @@ class _Path:
         if np.array_equal(u, self._place):
             return self._response
 
-        def product(direction: Floats) -> Floats:
-            """Return K_T times a direction: half the difference of the forces beside u."""
-            change = DIFFERENCE * np.abs(u).max() / np.abs(direction).max()
-            forward, backward = (self.internal(u + c * direction) for c in (change, -change))
-            return np.asarray((forward - backward) / (2.0 * change))
-
-        K = LinearOperator((len(u), len(u)), matvec=product, dtype=np.float64)
-        M = LinearOperator(K.shape, matvec=self._tangent.approximate, dtype=np.float64)
+        K = LinearOperator((len(u), len(u)), matvec=self._product(u), dtype=np.float64)
+        M = LinearOperator(K.shape, matvec=self._approximation(u), dtype=np.float64)
         compliant, failed = cg(
             K, self.load, start, rtol=CLOSE_DIRECTION, maxiter=MOST_PRODUCTS, M=M
         )
@@ -265,6 +259,144 @@ class _Path:
             self._factorise(u)
             return self._response
         return np.asarray(compliant)
+
+    def _product(self, u: Floats) -> Callable[[Floats], Floats]:
+        """Return K_T times a direction: half the difference of the forces beside u."""
+
+        def product(direction: Floats) -> Floats:
+            change = DIFFERENCE * np.abs(u).max() / np.abs(direction).max()
+            forward, backward = (self.internal(u + c * direction) for c in (change, -change))
+            return np.asarray((forward - backward) / (2.0 * change))
+
+        return product
+
+    def _approximation(self, _: Floats) -> Callable[[Floats], Floats]:
+        """Return the displacement of the factorised tangent under a load."""
+        return self._tangent.approximate
+
+
+class _LiftingPath(_Path):
+    """Equilibria of a nonlinear plate on one-sided supports.
+
+    Each iteration solves the plate that the tangent and the updates of BFGS describe, with the
+    supports that are closed at its end: they are an active set, as in a static response.
+    """
+
+    _tangent: HeldTangent
+
+    def _factorise(self, u: Floats) -> None:
+        self._place = u
+        self._tangent = HeldTangent(self._plate, self._reduction.field(u), self._reduction)
+        self._held_response = self._tangent.solve(self.load)
+        is_open = self._open(u) if u.any() else self._tangent.opened_by(self._held_response)
+        self._response = self._tangent.released(self._held_response, is_open)
+
+    def _open(self, u: Floats) -> Bools:
+        """Return the supports that are open."""
+        return ~self._tangent.supports.closed(u)
+
+    def _springs(self, is_open: Bools) -> Floats:
+        """Return the stiffness of the supports that are closed, (n,)."""
+        return self._tangent.supports.springs(~is_open, len(self.load))
+
+    def internal(self, u: Floats) -> Floats:
+        """Return the internal forces f(u), (n,)."""
+        return super().internal(u) + self._springs(self._open(u)) * u
+
+    def equilibrium(self, u: Floats) -> Floats | None:
+        """Return the equilibrium of the deflection of a displacement; None without convergence."""
+        stiffness = _HeldStiffness(self._tangent)
+        forces = super().internal(u)
+        for _ in range(MOST_ITERATIONS):
+            try:
+                change = self._change(u, forces, stiffness)
+            except (SingularStiffnessError, ConvergenceError):
+                return None
+            u = u + change
+            size = float(np.abs(change).max() / np.abs(u).max())
+            if size <= CLOSE:
+                return u
+            if not size < MOST_CHANGE:
+                return None
+            before, forces = forces, super().internal(u)
+            stiffness.update(change, forces - before)
+        return None
+
+    def _change(self, u: Floats, forces: Floats, stiffness: _HeldStiffness) -> Floats:
+        """Return the change of the displacement, which leaves the deflection as it is."""
+        supports = self._tangent.supports
+        response = stiffness.displacement(self.load)
+
+        def bound(change: Floats) -> Floats:
+            factor = float(self.load @ change) / float(self.load @ response)
+            return np.asarray(change - factor * response)
+
+        held = forces + supports.springs(np.ones(len(supports.dofs), dtype=bool), len(u)) * u
+        change = bound(stiffness.displacement(-held))
+        at_supports = response[supports.dofs]
+        G = stiffness.G - np.outer(at_supports, at_supports) / float(self.load @ response)
+        is_open, opened = supports.opened(G, (u + change)[supports.dofs])
+        released = np.zeros_like(u)
+        np.add.at(released, supports.dofs[is_open], opened)
+        return change + bound(stiffness.displacement(released))
+
+    def _product(self, u: Floats) -> Callable[[Floats], Floats]:
+        springs, plate = self._springs(self._open(u)), super().internal
+
+        def product(direction: Floats) -> Floats:
+            change = DIFFERENCE * np.abs(u).max() / np.abs(direction).max()
+            forward, backward = (plate(u + c * direction) for c in (change, -change))
+            return np.asarray((forward - backward) / (2.0 * change) + springs * direction)
+
+        return product
+
+    def _approximation(self, u: Floats) -> Callable[[Floats], Floats]:
+        is_open = self._open(u)
+        return lambda load: self._tangent.released(self._tangent.approximate(load), is_open)
+
+
+class _HeldStiffness:
+    """Tangent of a plate with all supports closed; BFGS updates the part of the plate.
+
+    Supports are left out of the updates: without the open ones the stiffness is positive definite.
+
+    Attributes
+    ----------
+    G : ndarray
+        Displacements of the supports by unit forces on them.
+    """
+
+    def __init__(self, tangent: HeldTangent) -> None:
+        self._tangent = tangent
+        # Updates are the sum of s c c^T over vectors c: these, 1/s, and the displacements by c.
+        self._vectors: list[Floats] = []
+        self._compliances: list[float] = []
+        self._displacements: list[Floats] = []
+        self.G = tangent.G
+
+    def displacement(self, load: Floats) -> Floats:
+        """Return the displacement under a load, (n,)."""
+        u = self._tangent.approximate(load)
+        if not self._vectors:
+            return u
+        X = np.array(self._displacements)
+        return np.asarray(u - np.linalg.solve(self._inner, np.array(self._vectors) @ u) @ X)
+
+    def update(self, change: Floats, force: Floats) -> None:
+        """Take the change of the plate's internal forces with the displacement into account."""
+        known = self._tangent.plate_forces(change)
+        for vector, compliance in zip(self._vectors, self._compliances, strict=True):
+            known += float(vector @ change) / compliance * vector
+        work, known_work = float(change @ force), float(change @ known)
+        if not min(work, known_work) > 0.0:
+            return
+        self._vectors += [known, force]
+        self._compliances += [-known_work, work]
+        self._displacements += [self._tangent.approximate(c) for c in (known, force)]
+        X = np.array(self._displacements)
+        self._inner = np.diag(self._compliances) + np.array(self._vectors) @ X.T
+        at_supports = X[:, self._tangent.supports.dofs]
+        self.G = self._tangent.G - at_supports.T @ np.linalg.solve(self._inner, at_supports)
 
 
 MIDPOINTS = 1000  # number of midpoints in quadratures over force and deflection

@@ -240,6 +240,118 @@ class Tangent:
         return change
 
 
+class OneSidedDofs(NamedTuple):
+    """One-sided supports by dof and side: several rows of one node and side are one."""
+
+    dofs: Indices  # independent dofs, (n,)
+    side: Floats  # (n,)
+    compliances: Floats  # 1/k, (n,)
+    which: Indices  # of each row of supports that is one-sided
+
+    def closed(self, u: Floats) -> Bools:
+        """Return whether displacements of the independent dofs close each support, (n,)."""
+        return np.asarray(self.side * u[self.dofs] >= 0.0)
+
+    def springs(self, closed: Bools, count: int) -> Floats:
+        """Return the stiffness of all independent dofs, (count,), of the supports of a mask."""
+        return np.asarray(
+            np.bincount(self.dofs[closed], 1.0 / self.compliances[closed], count), dtype=float
+        )
+
+    def resistance(self, G: Floats, is_open: Bools) -> Floats:
+        """Return 1/k - G of open supports."""
+        return np.asarray(np.diag(self.compliances[is_open]) - G[np.ix_(is_open, is_open)])
+
+    def opened(self, G: Floats, c: Floats) -> tuple[Bools, Floats]:
+        """Return the supports that the load opens, (n,), and the forces that open them.
+
+        G and c are those of :class:`HeldTangent`.  Raises SingularStiffnessError and
+        ConvergenceError.
+        """
+        is_open: Bools = np.zeros(len(c), dtype=bool)
+        for _ in range(MOST_ACTIVE_SETS):
+            resistance = self.resistance(G, is_open)
+            if not _resists(resistance, self.compliances[is_open]):
+                raise SingularStiffnessError("the plate tips off its one-sided supports")
+            opened = np.linalg.solve(resistance, c[is_open])
+            opens = self.side * (c + G[:, is_open] @ opened) < 0.0
+            if np.array_equal(opens, is_open):
+                return is_open, np.asarray(opened)
+            is_open = opens
+        raise ConvergenceError(
+            "the one-sided supports (UNIL) open and close in turns after "
+            f"{MOST_ACTIVE_SETS} solutions"
+        )
+
+
+def _one_sided_dofs(supports: NodeSupports, reduction: SymmetryReduction) -> OneSidedDofs:
+    """Return the distinct pairs of a dof and a side of the one-sided supports."""
+    rows = supports.select(supports.is_one_sided)
+    keys = np.column_stack([reduction.index[rows.node, W], rows.side])
+    pairs, which = np.unique(keys, axis=0, return_inverse=True)
+    compliances = 1.0 / np.bincount(which.ravel(), rows.stiffness)
+    return OneSidedDofs(pairs[:, 0].astype(np.intp), pairs[:, 1], compliances, which.ravel())
+
+
+def _unit_forces(dofs: Indices, count: int) -> Floats:
+    """Return unit forces on dofs, (count, dofs)."""
+    unit = np.zeros((count, len(dofs)))
+    unit[dofs, np.arange(len(dofs))] = 1.0
+    return unit
+
+
+def _resists(resistance: Floats, compliances: Floats) -> bool:
+    """Return whether a plate without the opened supports is held: 1/k - G is positive definite.
+
+    A pivot far below the compliance 1/k of its support is rounding: the plate is then free to tip.
+    """
+    try:
+        factor = np.linalg.cholesky(resistance)
+    except np.linalg.LinAlgError:
+        return False
+    return bool((np.diagonal(factor) ** 2 > NOT_HELD * compliances).all())
+
+
+class HeldTangent(Tangent):
+    """Factorised stiffness about a field, with all one-sided supports closed.
+
+    Opening supports of the stiffness k adds the displacement
+
+        Z (1/k - G)^-1 c,
+
+    where Z are the displacements by unit forces on these supports, and G and c the displacements of
+    the supports by the unit forces and by the load (Sherman, Morrison and Woodbury).  Supports have
+    no gaps here.
+    """
+
+    supports: OneSidedDofs
+    G: Floats
+
+    def __init__(
+        self, plate: PlateModel, field: Floats | None, reduction: SymmetryReduction
+    ) -> None:
+        super().__init__(plate, field, reduction, held=True)
+        if plate.supports is not None and plate.lifts:
+            self.supports = _one_sided_dofs(plate.supports, reduction)
+            self._Z = self.approximate(_unit_forces(self.supports.dofs, reduction.count))
+            self.G = self._Z[self.supports.dofs]
+
+    def plate_forces(self, u: Floats) -> Floats:
+        """Return the forces of the tangent, (neq,), without those of one-sided supports."""
+        springs = self.supports.springs(np.ones(len(self.supports.dofs), dtype=bool), len(u))
+        return np.asarray(self._stiffness @ u - springs * u)
+
+    def opened_by(self, u: Floats) -> Bools:
+        """Return the supports that a load opens, from the displacement of the held plate."""
+        return self.supports.opened(self.G, u[self.supports.dofs])[0]
+
+    def released(self, u: Floats, is_open: Bools) -> Floats:
+        """Return a displacement of the held plate, (neq,), after the opening of supports."""
+        resistance = self.supports.resistance(self.G, is_open)
+        opened = np.linalg.solve(resistance, u[self.supports.dofs[is_open]])
+        return np.asarray(u + self._Z[:, is_open] @ opened)
+
+
 class StaticResponse(NamedTuple):
     """Static response of a plate to a unit force, at rest: stretching is left out.
 
@@ -275,13 +387,8 @@ def static_response(plate: PlateModel, contact: Floats) -> StaticResponse:
     """Compute the response to a unit force, whose nodal forces are `contact`, (numnp, 5).
 
     One-sided supports have no gaps here, so that displacements are proportional to the force.  The
-    supports that the force closes are an active set.  It is found from the response of the plate
-    with all supports closed: opening supports of the stiffness k adds the displacement
-
-        Z (1/k - G)^-1 c,
-
-    where Z are the displacements by unit forces on these supports, and G and c the displacements of
-    the supports by the unit forces and by the load (Sherman, Morrison and Woodbury).
+    supports that the force closes are an active set, which is found from the response of the plate
+    with all supports closed (:class:`HeldTangent`).
 
     Raises
     ------
@@ -293,17 +400,15 @@ def static_response(plate: PlateModel, contact: Floats) -> StaticResponse:
     # At rest u and v of a flat plate of an uncoupled laminate do not move with w.
     reduction = symmetry_reduction(replace(plate, nonlinear=False), contact)
     load = reduction.gather(contact)
-    tangent = Tangent(plate, reduction=reduction, held=True)
+    tangent = HeldTangent(plate, None, reduction)
     u = tangent.solve(load)
     supports = None if plate.supports is None else plate.supports.without_gaps()
     if supports is None or not plate.lifts:
         return StaticResponse(reduction.field(u), float(load @ u), supports)
-    rows = _one_sided_dofs(supports, reduction)
-    Z = tangent.approximate(_unit_forces(rows.dofs, len(load)))
-    is_open, opened = rows.opened(Z[rows.dofs], u[rows.dofs])
-    displacement = u + Z[:, is_open] @ opened
+    is_open = tangent.opened_by(u)
+    displacement = tangent.released(u, is_open)
     closed = ~supports.is_one_sided
-    closed[supports.is_one_sided] = ~is_open[rows.which]
+    closed[supports.is_one_sided] = ~is_open[tangent.supports.which]
     field = reduction.field(displacement)
     return StaticResponse(field, float(load @ displacement), supports.select(closed))
 
@@ -320,8 +425,8 @@ def window_compliances(plate: PlateModel, contact: Floats, tips: Indices) -> Win
     """Compute the compliances of a plate whose one-sided supports are a window, (numnp, 5) forces.
 
     `tips` are the nodes, from 0, of the tips of clamps.  One factorisation serves the three: the
-    forces that hold the tips make the clamped plate's G and c of :func:`static_response`, which
-    raises the same errors.
+    forces that hold the tips make the clamped plate's G and c of :class:`HeldTangent`.  Raises the
+    errors of :func:`static_response`.
     """
     assert plate.supports is not None
     reduction = symmetry_reduction(replace(plate, nonlinear=False), contact)
@@ -344,64 +449,6 @@ def window_compliances(plate: PlateModel, contact: Floats, tips: Indices) -> Win
         (c - holding @ c[tip])[window],
     )
     return WindowCompliances(held, pushed(held, G[np.ix_(window, window)], c[window]), clamped)
-
-
-class _OneSidedDofs(NamedTuple):
-    """One-sided supports by dof and side: several rows of one node and side are one."""
-
-    dofs: Indices  # independent dofs, (n,)
-    side: Floats  # (n,)
-    compliances: Floats  # 1/k, (n,)
-    which: Indices  # of each row of supports that is one-sided
-
-    def opened(self, G: Floats, c: Floats) -> tuple[Bools, Floats]:
-        """Return the supports that the load opens, (n,), and the forces that open them.
-
-        G and c, and the errors, are those of :func:`static_response`.
-        """
-        is_open = np.zeros(len(c), dtype=bool)
-        for _ in range(MOST_ACTIVE_SETS):
-            compliances = self.compliances[is_open]
-            resistance = np.diag(compliances) - G[np.ix_(is_open, is_open)]
-            if not _resists(resistance, compliances):
-                raise SingularStiffnessError("the plate tips off its one-sided supports")
-            opened = np.linalg.solve(resistance, c[is_open])
-            opens = self.side * (c + G[:, is_open] @ opened) < 0.0
-            if np.array_equal(opens, is_open):
-                return is_open, opened
-            is_open = opens
-        raise ConvergenceError(
-            "the one-sided supports (UNIL) open and close in turns after "
-            f"{MOST_ACTIVE_SETS} solutions"
-        )
-
-
-def _one_sided_dofs(supports: NodeSupports, reduction: SymmetryReduction) -> _OneSidedDofs:
-    """Return the distinct pairs of a dof and a side of the one-sided supports."""
-    rows = supports.select(supports.is_one_sided)
-    keys = np.column_stack([reduction.index[rows.node, W], rows.side])
-    pairs, which = np.unique(keys, axis=0, return_inverse=True)
-    compliances = 1.0 / np.bincount(which.ravel(), rows.stiffness)
-    return _OneSidedDofs(pairs[:, 0].astype(np.intp), pairs[:, 1], compliances, which.ravel())
-
-
-def _unit_forces(dofs: Indices, count: int) -> Floats:
-    """Return unit forces on dofs, (count, dofs)."""
-    unit = np.zeros((count, len(dofs)))
-    unit[dofs, np.arange(len(dofs))] = 1.0
-    return unit
-
-
-def _resists(resistance: Floats, compliances: Floats) -> bool:
-    """Return whether a plate without the opened supports is held: 1/k - G is positive definite.
-
-    A pivot far below the compliance 1/k of its support is rounding: the plate is then free to tip.
-    """
-    try:
-        factor = np.linalg.cholesky(resistance)
-    except np.linalg.LinAlgError:
-        return False
-    return bool((np.diagonal(factor) ** 2 > NOT_HELD * compliances).all())
 
 
 def compliance(plate: PlateModel, contact: Floats) -> float:

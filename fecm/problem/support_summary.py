@@ -112,7 +112,8 @@ def support_rows(summary: SupportsSummary, units: dict[str, str]) -> Iterator[Ro
         points = _stiffness(one_sided["number"], "points", one_sided["stiffness"], "w", units)
         texts = [points]
         if gap := one_sided["gap"]:
-            texts.append(f"gap up to {quantity(gap, unit_of('length', units))}")
+            width = quantity(gap, unit_of("length", units))
+            texts.append(f"gap up to {width}, which static estimates leave out")
         if (gain := one_sided["flexibility_gain"]) is not None:
             texts.append(f"they make the plate {gain:.2%} more flexible")
         yield ("one-sided", ", ".join(texts))

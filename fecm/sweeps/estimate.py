@@ -78,8 +78,8 @@ class Estimate:
         ``"infinite plate"``, ``"static plate"`` and ``"nonlinear static plate"``, as far as the
         plate has them, and the ``"run"``.
     remarks : dict of str to str
-        What models neglect (``"damping"``, ``"preload"``, ``"curvature"``), and how good the static
-        model of a nonlinear plate is, or why it is missing (``"stretching"``).
+        What models neglect (``"damping"``, ``"preload"``, ``"curvature"``, ``"gaps"``), and how
+        good the static model of a nonlinear plate is, or why it is missing (``"stretching"``).
     notes : tuple of str
         Reasons to doubt the numbers.
     units : dict of str to str
@@ -224,6 +224,8 @@ def estimate_problem(problem: Problem) -> Estimate:
         remarks["preload"] = "in the static plate and the run: the infinite plate neglects PREL"
     if problem.plate.is_curved:
         remarks["curvature"] = "in the static plate and the run: the infinite plate is flat"
+    if (supports := problem.moving_plate.supports) is not None and supports.gap.any():
+        remarks["gaps"] = "in the run only: the static plates leave out the gaps of UNIL"
     if problem.threshold is not None:
         words = from_threshold(problem.threshold.number)
         first = "; plies and interfaces may fail before" if words == AT_THE_LATEST else ""

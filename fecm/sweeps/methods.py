@@ -177,7 +177,10 @@ class ReducedRuns(SharedPlate):
         if REFINE in names or "dt" in names:
             return "the reduced model has a time step of its own: dt and refine can't vary"
         if checked.plate.lifts:
-            return "the reduced model has no one-sided supports (UNIL): leave it out"
+            return (
+                "the reduced model has no one-sided supports (UNIL): take full runs (leave out the "
+                "reduced model), or a window that holds (fecm new --window held)"
+            )
         if not checked.deck.has(Nonlinear):
             return "the reduced model is for decks with NONL; cases of others share a run"
         if not only_impacts(checked):
