@@ -97,6 +97,7 @@ def test_the_policy_allows_the_script_and_the_style_of_the_page_alone() -> None:
     [
         (small().replace("ROD\n", "UNIL\n13,0,1,0.,0.\n\nROD\n", 1), None, "has UNIL"),
         (small(), "k=1e5,2e5", "k does not change the plate"),
+        (small().replace("3     115.0", "3       0.0"), None, "must not be 0"),
         (small().replace("RODP", "EXCD\nRODP", 1), None, "other steps"),
     ],
 )

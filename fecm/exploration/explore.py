@@ -14,6 +14,7 @@ from typing import Any
 from fecm._errors import FecmError, FecmWarning
 from fecm._files import beside, check_outputs
 from fecm._options import documented, option, with_parameters_of
+from fecm.authoring.strike_values import strike_of
 from fecm.authoring.values import OF_PLATE
 from fecm.deck.catalogue import system_of
 from fecm.deck.units import PREFIXED, PREFIXES, in_si, unit_names, unit_of
@@ -129,6 +130,10 @@ class Exploration:
             raise ExploreError(
                 "the page has impacts that start at rest, with steps of one size: the deck has "
                 "other steps, nodal forces or prescribed displacements"
+            )
+        if not strike_of(problem.deck).velocity:
+            raise ExploreError(
+                "the sliders start at the velocity of ROD, which must not be 0: give the deck one"
             )
         names = [name for name in self._plan.cases[0] if name not in OF_PLATE]
         if names:

@@ -296,13 +296,14 @@ function choose(kind, choice) {
 
 /** Sliders of a group: name, label, and the values at their ends. */
 function sliders() {
-  const base = atRest, {spans} = data, list = [];
+  const base = atRest, {spans} = data, list = [], {factor} = first.strike;
+  const part = factor > 1 ? ` of the deck's 1/${factor}` : "";
   const spread = (value, [low, high], power = 1) => [value * low ** power, value * high ** power];
   const v = first.strike.velocity, of = {energy: spread(base.energy, spans.energy), velocity: spread(v, spans.energy, 0.5),
     height: data.gravity ? spread(v * v / (2 * data.gravity), spans.energy) : null};
   list.push({group: "Impact", name: state.speed, label: {energy: "energy", velocity: "velocity", height: "drop height"}[state.speed], ends: of[state.speed]});
-  if (first.strike.scales) list.push({group: "Impact", name: "mass", label: "mass of the projectile", ends: spread(base.mass, spans.mass)});
-  list.push(state.law === "k" ? {group: "Contact", name: "k", label: "contact coefficient k", ends: spread(base.k, spans.k)}
+  if (first.strike.scales) list.push({group: "Impact", name: "mass", label: `mass of the projectile${part}`, ends: spread(base.mass, spans.mass)});
+  list.push(state.law === "k" ? {group: "Contact", name: "k", label: `contact coefficient k${part}`, ends: spread(base.k, spans.k)}
     : {group: "Contact", name: "radius", label: "radius of a steel tip", ends: spread((base.k / first.strike.unitK) ** 2, spans.k, 1)});
   if (base.giic !== null) {
     list.push({group: "Laminate", name: "giic", label: "toughness G_IIc", ends: spread(base.giic, spans.giic)});
