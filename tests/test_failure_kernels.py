@@ -328,6 +328,36 @@ def test_the_largest_exposures_that_count_are_those_of_all_states(
             np.testing.assert_allclose(envelope.largest.strain[number], wanted, rtol=1e-11)
 
 
+@pytest.mark.parametrize("stretches", [True, False])
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.few(9)  # of 20, 0.01 s each
+def test_states_that_can_not_be_the_largest_are_left_out_without_a_change_of_a_bit(
+    case: str, stretches: bool
+) -> None:
+    compiled, _ = CASES[case](stretches=stretches)
+    monitor, given = with_counts(compiled, 0.9), fields(plate(), 12, stretched=stretches)
+    whole, few = history(monitor, given), monitor.start()
+    monitor.for_largest().raise_largest(few, given, times_of(given))
+    for name, values in vars(whole.largest).items():
+        np.testing.assert_array_equal(getattr(few.largest, name), values, err_msg=name)
+    left_out = few.plies.exposure < whole.plies.exposure
+    assert left_out.any()
+
+
+def test_the_largest_strain_of_the_faces_is_that_of_their_circles_of_mohr() -> None:
+    compiled, _ = one_laminate(stretches=True)
+    given = fields(plate(), 3, stretched=True)
+    half = np.random.default_rng(1).uniform(0.0, 0.5, compiled.counts.size)
+    half[::3] = 0.0
+    monitor = compiled.for_strains(half)
+    strains = np.stack([compiled.stresses.strains(field)[0].reshape(-1, 6) for field in given])
+    z = np.stack([half, -half])[..., None]
+    xx, yy, xy = np.moveaxis(strains[:, None, :, :3] + z * strains[:, None, :, 3:], -1, 0)
+    tensors = np.stack([np.stack([xx, xy / 2.0], -1), np.stack([xy / 2.0, yy], -1)], -2)
+    wanted = np.abs(np.linalg.eigvalsh(tensors))[:, :, half > 0.0].max()
+    assert monitor.largest_strain(monitor.start(), given) == pytest.approx(wanted, rel=1e-12)
+
+
 @pytest.mark.parametrize("kind", [CompiledMonitor, FailureMonitor])
 @pytest.mark.parametrize("incomplete", [3, 12])
 def test_interfaces_of_elements_without_nine_nodes_are_never_the_largest(

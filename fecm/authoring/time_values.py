@@ -70,6 +70,12 @@ def duration_of(checked: Problem) -> float:
     return _length(checked.deck.macros, default_step).duration
 
 
+def step_of(checked: Problem) -> float:
+    """Return the time step of a problem whose steps have one size."""
+    size = next(macro.value for macro in flat(checked.program) if macro.word == "DT")
+    return size or taken_time_step(checked.critical_time_step)
+
+
 def lengthened(checked: Problem, factor: float) -> Problem:
     """Return a problem that runs `factor` times as long, with the same time step."""
     deck, default_step = checked.deck, taken_time_step(checked.critical_time_step)

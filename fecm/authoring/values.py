@@ -431,9 +431,17 @@ def apply_case(deck: Deck, case: Case, objects: Parts | None = None) -> Deck:
     return replace(_apply_times(deck, changed, case), text="")
 
 
+def with_exposure_values(plate: Deck, case: Case) -> Deck:
+    """Return the deck of a plate with the strengths and the residual stresses of a case."""
+    for name in EXPOSURE_NAMES:
+        if name in case:
+            plate = _PLATE_SETTERS[name](plate, case[name])
+    return plate
+
+
 def strike_of_case(plate: Deck, case: Case) -> Strike:
-    """Return the strike of a plate with the values of a case; ignore values of the plate."""
-    strike = strike_of(plate)
+    """Return the strike of a plate with the values of a case; ignore other values of the plate."""
+    strike = strike_of(with_exposure_values(plate, case))
     for name, setter in _STRIKE_SETTERS.items():
         if name in case:
             strike = setter(strike, case[name])

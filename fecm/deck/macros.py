@@ -13,6 +13,9 @@ from enum import Enum, auto
 from numbers import Integral
 from typing import ClassVar, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fecm._errors import FecmError
 from fecm.deck.card import Fields, Record, Value, layout, parse_real
 from fecm.deck.findings import Findings
@@ -432,6 +435,45 @@ def _executed(body: Body, count: int = 1, outer: int = 1) -> Iterator[tuple[Macr
             yield item.macro, item.count, outer * count
         else:
             yield item, count, outer
+
+
+def steps_at(body: Body, word: str) -> NDArray[np.int64]:
+    """Return the numbers of the impact steps, from 1, after which a macro stores a row.
+
+    OVER does not end the steps.
+    """
+    parts: list[NDArray[np.int64]] = []
+    _add_steps(body, word, 1, 0, parts)
+    return np.unique(np.concatenate(parts)) if parts else np.empty(0, dtype=np.int64)
+
+
+def _add_steps(
+    body: Body, word: str, passes: int, first: int, parts: list[NDArray[np.int64]]
+) -> int:
+    """Add the steps of `passes` passes of a body that begins after `first` steps.
+
+    Returns the number of steps after it.
+    """
+    if any(isinstance(item, Loop) for item in body):
+        for number in range(1, passes + 1):
+            for item in body:
+                if isinstance(item, Loop):
+                    first = _add_steps(item.body, word, item.count, first, parts)
+                elif item.word in STEPS:
+                    first += 1
+                if isinstance(item, Macro) and item.word == word and not number % every(item):
+                    parts.append(np.array([first]))
+        return first
+    a_pass = sum(item.word in STEPS for item in body if isinstance(item, Macro))
+    before = 0
+    for item in body:
+        if isinstance(item, Macro):
+            before += item.word in STEPS
+            if item.word == word:
+                n = every(item)
+                numbers = np.arange(n, passes + 1, n)
+                parts.append(first + (numbers - 1) * a_pass + before)
+    return first + passes * a_pass
 
 
 HISTORY = "RODP"

@@ -239,19 +239,25 @@ class CircleStresses(PlyStresses):
 
     def strains(self, field: Floats) -> tuple[Floats, Floats]:
         """Return the strains of a field (numnp, 5) at the points, (n, 1, 6); gradients are NaN."""
-        q = field[self._nodes]  # (entries, nodes, 5)
-        values = (self._means @ (self._shapes @ q).reshape(len(q), -1)).reshape(-1, 3, 5)
+        (strains,) = self.strains_of_fields(field[None])
+        return strains, np.full((len(strains), 2, 6), np.nan)
+
+    def strains_of_fields(self, fields: Floats) -> Floats:
+        """Return the strains of fields (fields, numnp, 5) at the points, (fields, n, 1, 6)."""
+        q = fields[:, self._nodes]  # (fields, entries, nodes, 5)
+        values = self._means @ (self._shapes @ q).reshape(*q.shape[:2], -1)
+        values = values.reshape(len(q), -1, 3, 5)
         if self._mirrored is not None:
-            values[self._mirrored] = 0.0
-        slopes = values[:, 1:]
-        strains = strains_of(np.concatenate([slopes[..., :2], -slopes[..., 3:]], axis=2))
-        strains[:, :3] += values[:, :1, 2] * strain_of_deflection(self.curvature)
+            values[:, self._mirrored] = 0.0
+        slopes = values[:, :, 1:]
+        strains = strains_of(np.concatenate([slopes[..., :2], -slopes[..., 3:]], axis=3))
+        strains[..., :3] += values[:, :, :1, 2] * strain_of_deflection(self.curvature)
         if self.nonlinear:
-            x, y = slopes[:, 0, 2], slopes[:, 1, 2]
-            strains[:, :3] += np.stack([x * x / 2.0, y * y / 2.0, x * y], axis=1)
+            x, y = slopes[:, :, 0, 2], slopes[:, :, 1, 2]
+            strains[..., :3] += np.stack([x * x / 2.0, y * y / 2.0, x * y], axis=2)
         if self.initial is not None:
-            strains[:, :3] += self.initial
-        return strains[:, None], np.full((len(strains), 2, 6), np.nan)
+            strains[..., :3] += self.initial
+        return strains[:, :, None]
 
 
 def _mirrored(points: Floats, mirrors: Sequence[Mirror], radius: float) -> Bools | None:

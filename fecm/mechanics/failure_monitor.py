@@ -330,6 +330,12 @@ class FailureMonitor:
             rows.append(self.largest(envelope))
         return Evaluations.of(rows)
 
+    def raise_largest(
+        self, envelope: FailureEnvelope, fields: Floats, times: Sequence[float]
+    ) -> None:
+        """Raise the exposures as :meth:`update` does; :meth:`largest` has the largest ones."""
+        self.update(envelope, fields, times)
+
     def largest(self, envelope: FailureEnvelope) -> Largest:
         """Return the largest exposures so far, including the exposures on the circle.
 
@@ -392,7 +398,7 @@ class FailureMonitor:
                 times[number] = plies.time[number, state - self._all_states]
                 by_point = plies.exposure[number].reshape(-1, self.circle.states)
                 points[number] = np.count_nonzero((by_point >= threshold).any(axis=1))
-        order = self._order
+        order = self.order
         return columns | {"time": times[order], "points": points[order]}
 
     @property
@@ -401,7 +407,7 @@ class FailureMonitor:
         return np.zeros(len(self.far)) if self.around is None else self.around.factor
 
     @property
-    def _order(self) -> list[int]:
+    def order(self) -> list[int]:
         """Order of the criteria in columns: the interlaminar one precedes user-defined ones."""
         built_in, count = len(failure.CRITERIA), len(self.criteria) + 1
         return [*range(built_in), count - 1, *range(built_in, count - 1)]
@@ -498,7 +504,7 @@ class FailureMonitor:
                 for name, values in {"exposure": evaluations.exposure, "x": x, "y": y}.items()
             },
         }
-        return {name: values[:, self._order] for name, values in columns.items()}
+        return {name: values[:, self.order] for name, values in columns.items()}
 
     def _plies_of(self, state: Array) -> tuple[Array, Indices]:
         """Return the plies, from 1, and the rows of the points of states."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.mechanics.impact_steps import LawKind
-from fecm.mechanics.kernels import LIBRARY, Doubles, Structure, filled, floats
+from fecm.mechanics.kernels import LIBRARY, Doubles, Longs, Structure, filled, floats
 from fecm.mechanics.projectile import RodIntegrator
 from fecm.mechanics.rod_modes import ProjectileModes
 
@@ -105,6 +105,9 @@ class ReducedStruct(Structure):
                   pairs)
     `transposed`  (pairs,                  its transpose
                   rank + n - coupled)
+    `step`        (rows,)                  first step that ends at or after each stored time
+    `back`        (rows,)                  time from there to the end of the step, over the step
+    `stored`      (cases, rows, n)         coordinates; the kernel writes them
     ============  =======================  =====================================================
     """
 
@@ -122,6 +125,10 @@ class ReducedStruct(Structure):
         ("rate", Doubles),
         ("factor", Doubles),
         ("transposed", Doubles),
+        ("rows", c_int64),  # stored times
+        ("step", Longs),
+        ("back", Doubles),
+        ("stored", Doubles),
     )
 
 
@@ -143,6 +150,7 @@ class Swept(NamedTuple):
     given: Floats
     force: Floats  # (cases, steps)
     found: Floats
+    coordinates: Floats | None = None  # (cases, rows, n): of a reduced plate at stored times
 
 
 def sweep_linear(response: Floats, rigid: float, swept: Swept) -> None:
@@ -157,6 +165,8 @@ def sweep_linear(response: Floats, rigid: float, swept: Swept) -> None:
 
 def sweep_reduced(plate: ReducedStruct, swept: Swept) -> None:
     """Compute impacts on a nonlinear plate in a few modes.  Raises MemoryError."""
+    if swept.coordinates is not None:
+        plate.stored = floats(swept.coordinates)
     structure = sweep_structure(np.empty(0), 0.0, swept)
     if not LIBRARY.fecm_reduced(ctypes.byref(structure), ctypes.byref(plate)):
         raise MemoryError
@@ -164,7 +174,7 @@ def sweep_reduced(plate: ReducedStruct, swept: Swept) -> None:
 
 def sweep_structure(response: Floats, rigid: float, swept: Swept) -> SweepStruct:
     """Return what the kernel of a linear plate takes; see :func:`sweep_linear`."""
-    modes, step, law, given, force, found = swept
+    modes, step, law, given, force, found, _ = swept
     T, h = modes.step(step)
     before, after = step.weights
     cases, steps = force.shape

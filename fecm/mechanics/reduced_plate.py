@@ -47,6 +47,7 @@ central difference of a vibration is sin(omega dt)/(omega dt) times the velocity
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -91,6 +92,12 @@ MEMBRANE_MODES, MEMBRANE_SHARE, MEMBRANE_FASTEST = 6, 0.01, 1.5
 # static ones, by a share of each, and that reach from a part of the largest.
 STRETCHING = 1e-6
 SCATTER, SMALLEST, DEFLECTIONS = 0.5, 0.2, 200
+# Least size of displacements in the plane that a field has, over the largest.
+IN_PLANE = 1e-3
+# Static deflection, over the thickness, at which the omitted modes follow the membrane's forces
+# exactly; least energy of the states of membrane stress there, over the largest, and least size of
+# their forces.
+BENT, STATES, OMITTED = 2.0, 1e-5, 1e-2
 
 
 class ReductionError(FecmError, ArithmeticError):
@@ -104,6 +111,8 @@ class ReducedModes(NamedTuple):
     shapes: Floats  # (neq, m): unit modal mass
     deflection: Floats  # (m,): displacement under the load; positive
     compliance: float  # static displacement under a unit load
+    static: Floats  # (neq,): static displacements under a unit load
+    load: Floats  # the unit load
 
     @property
     def shares(self) -> Floats:
@@ -125,6 +134,7 @@ class ReducedPlate:
     cubic: Floats  # C, (n, pairs)
     factor: Floats  # B, (rank, pairs): Q = B' B
     damping: float = 0.0  # a of the damping matrix a M
+    fields: ReducedFields | None = None  # where displacement fields are asked for
 
     @property
     def fastest(self) -> float:
@@ -179,31 +189,133 @@ class ReducedPlate:
         return forces
 
 
+@dataclass(frozen=True)
+class ReducedFields:
+    """Displacement fields of a reduced plate, from its coordinates and the contact force.
+
+    The omitted modes follow the contact force and the forces of the membrane on the bending modes,
+    both statically and with the stiffness that the membrane gives them.  Their displacement is a
+    sum of few fields with unit stiffness.  The displacements in the plane follow from the pairs of
+    the bending modes and of the static displacement of the omitted ones.
+    """
+
+    bending: int  # m
+    shapes: Floats  # (n, numnp, 5): of the coordinates
+    omitted: Floats  # (few, numnp, 5): of the omitted modes
+    in_plane: Floats  # (rank, numnp, 2)
+    factor: Floats  # (rank, pairs): of the bending modes and the static displacement
+    membrane: Floats  # (states, pairs): states of membrane stress
+    push: Floats  # (few,): forces on the omitted modes per contact force
+    project: Floats  # (few,): static displacement of the omitted modes in their displacement
+    cubic: Floats  # (few, states * m): of a state and a bending mode
+    square: Floats  # (few, pairs): of a coupled laminate or a curved plate; zero otherwise
+    stiffness: Floats  # (states, few, few)
+
+    @property
+    def count(self) -> int:
+        """Number of amplitudes."""
+        return len(self.shapes) + len(self.omitted) + len(self.in_plane)
+
+    def amplitudes(self, q: Floats, force: Floats) -> Floats:
+        """Return the amplitudes, (rows, count), of coordinates (rows, n) and forces (rows,).
+
+        They are those of :attr:`shapes`, :attr:`omitted` and :attr:`in_plane`.
+        """
+        bent, few = q[:, : self.bending], len(self.omitted)
+        pairs = self._pairs(bent, force)
+        states = small_products(pairs, self.membrane.T)
+        triples = (states[:, :, None] * bent[:, None]).reshape(len(q), -1)
+        pull = force[:, None] * self.push + small_products(pairs, self.square.T)
+        pull += small_products(triples, self.cubic.T)
+        stiffness = small_products(states, self.stiffness.reshape(len(self.membrane), -1))
+        stiffness = np.eye(few) + stiffness.reshape(-1, few, few)
+        omitted = np.linalg.solve(stiffness, pull[:, :, None])[:, :, 0]
+        static = np.einsum("rf,f", omitted, self.project)
+        followed = small_products(self._pairs(bent, static), self.factor.T)
+        return np.column_stack([q, omitted, followed])
+
+    def _pairs(self, bent: Floats, static: Floats) -> Floats:
+        """Return the products of bending modes (rows, m) and of the static displacement (rows,)."""
+        moved = np.column_stack([bent, static])
+        first, second = np.triu_indices(self.bending + 1)
+        return np.asarray(moved[:, first] * moved[:, second])
+
+    @cached_property
+    def _tables(self) -> tuple[Floats, Floats]:
+        """Shapes of w and the rotations, and of u and v, in rows."""
+        shapes = np.concatenate([self.shapes, self.omitted])
+        bent = shapes[:, :, 2:].reshape(len(shapes), -1)
+        in_plane = np.concatenate([shapes[:, :, :2], self.in_plane])
+        return bent, in_plane.reshape(len(in_plane), -1)
+
+    def fields(self, amplitudes: Floats) -> Floats:
+        """Return displacement fields, (rows, numnp, 5)."""
+        bent, in_plane = self._tables
+        rows, numnp = len(amplitudes), self.shapes.shape[1]
+        fields = np.empty((rows, numnp, NDOF))
+        w = small_products(amplitudes[:, : len(bent)], bent)
+        fields[:, :, 2:] = w.reshape(rows, numnp, 3)
+        fields[:, :, :2] = small_products(amplitudes, in_plane).reshape(rows, numnp, 2)
+        return fields
+
+
+# Multiplications of a matrix product that BLAS leaves to one thread.
+SMALL = 64**3
+
+
+def small_products(a: Floats, b: Floats) -> Floats:
+    """Multiply matrices by products so small that the number of threads changes no bit."""
+    rows, inner = a.shape
+    product = np.empty((rows, b.shape[1]))
+    height = min(rows, 32) or 1
+    width = max(1, SMALL // (height * max(inner, 1)))
+    for start in range(0, rows, height):
+        part = a[start : start + height]
+        for column in range(0, b.shape[1], width):
+            cut = slice(column, column + width)
+            product[start : start + height, cut] = part @ b[:, cut]
+    return product
+
+
 def reduced_plate(
     plate: PlateModel,
     contact: Floats,
     count: int,
     damping: float = 0.0,
     error: float = STRETCHING,
+    *,
+    has_fields: bool = False,
 ) -> ReducedPlate:
     """Reduce a plate to the `count` bending modes, at most, that a load (numnp, 5) moves most.
 
-    `error` is the error of B, see :data:`STRETCHING`.  Raises ReductionError if the plate is not
-    held, or if its modes do not converge.
+    `error` is the error of B, see :data:`STRETCHING`.  With `has_fields` the plate also has its
+    displacement fields.  Raises ReductionError if the plate is not held, or if its modes do not
+    converge.
     """
     turn = _at_rest(plate, contact)
-    bending = _bending_modes(plate, turn, contact, count)
+    bending, held = _bending_modes(plate, turn, contact, count)
     plane = _free_in_plane(plate)
     # Modes that a half turn maps onto themselves have quadratic strains that it maps likewise.
     in_plane = symmetry_reduction(plane, None) if turn.is_half else unreduced(plane)
-    pairs = _integrated(plate, in_plane, bending.shapes)
+    bent, modes = bending.shapes, len(bending.stiffness)
+    if has_fields:
+        omitted = bending.static - bent @ (bending.deflection / bending.stiffness)
+        bent = np.column_stack([bent, omitted])
+    whole = _integrated(plate, in_plane, bent)
+    pairs = whole.of_first(modes)
     cubic, quartic = pairs.cubic, pairs.quartic
     stiffness, deflection = [bending.stiffness], [bending.deflection]
+    static = bending.deflection / bending.stiffness
+    shape_fields = np.array([plate.field(shape, 0.0) for shape in bent.T])
+    dynamic_fields: list[Floats] = []
+    solved = np.zeros_like(whole.loads)
+    followed = solved
     if plane.neq:
         tangent = Tangent(plane, reduction=in_plane)
-        quartic -= pairs.loads.T @ tangent.solve(pairs.loads)
-        first, second = np.triu_indices(len(bending.stiffness))
-        static = bending.deflection / bending.stiffness
+        solved = tangent.solve(whole.loads)
+        quartic -= pairs.loads.T @ of_first(modes, solved)
+        followed = -solved
+        first, second = np.triu_indices(modes)
         membrane = _moved_modes(
             tangent,
             _independent_mass(plane, in_plane, plane.mass),
@@ -218,16 +330,194 @@ def reduced_plate(
         cubic = np.concatenate([cubic, rows])
         stiffness.append(membrane.stiffness)
         deflection.append(np.zeros(len(rows)))
-    static = bending.deflection / bending.stiffness
+        dynamic = membrane.shapes.T @ whole.loads
+        followed = followed + (membrane.shapes / membrane.stiffness) @ dynamic
+        dynamic_fields = [in_plane.field(shape)[None] for shape in membrane.shapes.T]
+    fields = None
+    if has_fields:
+        factor, vectors = _few(followed, np.append(static, 1.0))
+        across = np.array([in_plane.field(vector) for vector in vectors.T])
+        followers = _omitted(plate, (turn, held), bending, shape_fields, whole, (in_plane, solved))
+        fields = ReducedFields(
+            bending=modes,
+            shapes=np.concatenate([shape_fields[:modes], *dynamic_fields]),
+            factor=factor,
+            in_plane=across.reshape(-1, *shape_fields.shape[1:])[..., :2].copy(),
+            **followers,
+        )
     return ReducedPlate(
-        bending=len(bending.stiffness),
+        bending=modes,
         stiffness=np.concatenate(stiffness),
         deflection=np.concatenate(deflection),
         flexibility=max(bending.compliance - float(bending.shares.sum()), 0.0),
         cubic=cubic,
         factor=factor_of((quartic + quartic.T) / 2.0, static, error),
         damping=damping,
+        fields=fields,
     )
+
+
+def _omitted(
+    plate: PlateModel,
+    held: tuple[SymmetryReduction, Tangent],
+    bending: ReducedModes,
+    shapes: Floats,
+    pairs: Pairs,
+    followed: tuple[SymmetryReduction, Floats],
+) -> dict[str, Floats]:
+    """Return how the omitted modes follow the contact and the membrane; see :class:`ReducedFields`.
+
+    `shapes` (numnp, 5) are those of the modes and of the omitted modes under a unit force; `held`
+    are the independent dofs and their stiffness, `followed` those of the membrane with K_mm^-1 r
+    of the pairs.
+    """
+    turn, tangent = held
+    m, numnp = len(bending.stiffness), len(plate.mesh.coordinates)
+    # Force that bends the linear plate by some thicknesses, and the amplitudes under it.
+    force = BENT * plate.thicknesses.max() / bending.compliance
+    static = force * np.append(bending.deflection / bending.stiffness, 1.0)
+    first, second = np.triu_indices(m + 1)
+    size = np.abs(static[first] * static[second])
+    quartic = pairs.quartic - pairs.loads.T @ followed[1]
+    values, vectors = np.linalg.eigh((quartic + quartic.T) / 2.0 * np.outer(size, size))
+    kept = np.flatnonzero(values > STATES * values[-1])[::-1]
+    membrane, states = vectors[:, kept].T / size, size[:, None] * vectors[:, kept]
+    forces = MembraneStates(plate, shapes, followed, states)
+    # Loads of the size that they have in this deflection, of which few are independent.
+    amount = np.abs(membrane @ (static[first] * static[second]))
+    amount = np.maximum(amount, STATES**0.5 * amount.max(initial=0.0))
+    scales = np.append(np.outer(amount, np.abs(static[:m])), size)
+    loads = np.column_stack([forces.on(shapes[:m]), forces.of_pairs]) * scales
+    gram = np.linalg.eigh(loads.T @ loads)
+    chosen = np.flatnonzero(gram.eigenvalues > OMITTED**2 * gram.eigenvalues[-1:])[::-1]
+    basis = gram.eigenvectors[:, chosen]
+    few = loads @ basis
+    across = shapes[:m].reshape(m, -1)
+    independent = np.stack([turn.gather(load.reshape(numnp, NDOF)) for load in few.T], axis=1)
+    solved = [turn.field(part).ravel() for part in tangent.solve(independent).T]
+    moved = (few.T @ across.T / bending.stiffness) @ across - np.reshape(
+        solved, (-1, across.shape[1])
+    )
+    # The first field is that of the contact force.  `work` is the product with the stiffness.
+    fields = np.concatenate([force * shapes[m].reshape(1, -1), moved])
+    contact = force * bending.load.reshape(1, -1)
+    work = np.concatenate([contact, -few.T]) @ fields.T
+    energy, vectors = np.linalg.eigh((work + work.T) / 2.0)
+    kept = np.flatnonzero(energy > OMITTED**2 * energy[-1])[::-1]
+    root = np.sqrt(energy[kept])
+    fields = (vectors[:, kept] / root).T @ fields
+    amplitudes = root[:, None] * vectors[:, kept].T
+    of_loads = amplitudes[:, 1:] @ basis.T / scales
+    cubic, of_pairs = np.split(of_loads, [len(membrane) * m], axis=1)
+    fields = fields.reshape(-1, numnp, NDOF)
+    stiffness = np.tensordot(
+        fields.reshape(len(fields), -1),
+        forces.on(fields).reshape(-1, len(membrane), len(fields)),
+        1,
+    )
+    return {
+        "membrane": membrane,
+        "omitted": fields,
+        "push": amplitudes[:, 0] / force,
+        "project": amplitudes[:, 0] * force / work[0, 0] if work[0, 0] > 0.0 else 0.0 * root,
+        "cubic": np.ascontiguousarray(cubic),
+        "square": np.ascontiguousarray(of_pairs),
+        "stiffness": np.ascontiguousarray(stiffness.transpose(1, 0, 2)),
+    }
+
+
+class MembraneStates:
+    """States of membrane stress, and their forces on the deflection of a plate.
+
+    `shapes` (modes, numnp, 5), `followed` and the pairs are those of :func:`_omitted`; `states`
+    (pairs, states) are the pairs of each state.
+    """
+
+    def __init__(
+        self,
+        plate: PlateModel,
+        shapes: Floats,
+        followed: tuple[SymmetryReduction, Floats],
+        states: Floats,
+    ) -> None:
+        in_plane, solved = followed
+        self._count, self._numnp = states.shape[1], shapes.shape[1]
+        displacement = -np.stack([in_plane.field(part)[:, :2] for part in solved.T], axis=2)
+        fields = shapes.transpose(1, 2, 0)
+        first, second = np.triu_indices(len(shapes))
+        # Forces of the pairs in a coupled laminate or a curved plate, (5 numnp, pairs).
+        self.of_pairs = np.zeros((NDOF * self._numnp, len(first)))
+        self._blocks: list[tuple[ElementBlock, QuadraticStrains, Floats]] = []
+        for family in plate.families:
+            laminate = plate.laminate_of(family)
+            for block in family.blocks(BLOCK):
+                tied = QuadraticStrains(block, plate.rules.bending)
+                basis = interpolate(block, plate.rules.bending)
+                linear = membrane_and_bending(basis, plate.curvature)  # (ne, points, 6, 5 nodes)
+                ne, nodes = block.nodes.shape
+                weight = basis.jxw[:, :, None, None]
+                strains = _pair_strains(plate, block, fields[block.nodes, 2])
+                of_plane = linear.reshape(ne, -1, 6, nodes, NDOF)[:, :, :3, :, :2]
+                nodal = displacement[block.nodes].reshape(ne, 1, 2 * nodes, -1)
+                strains += of_plane.reshape(ne, -1, 3, 2 * nodes) @ nodal
+                stresses = weight * (laminate.A @ (strains @ states))
+                self._blocks.append((block, tied, stresses.transpose(3, 2, 1, 0).copy()))
+                if not (laminate.is_coupled or plate.is_curved):
+                    continue
+                AB = np.hstack([laminate.A, laminate.B])
+                forces = linear.transpose(0, 3, 1, 2).reshape(ne, nodes * NDOF, -1)
+                resultants = (weight * (AB.T @ strains)).reshape(ne, -1, len(first))
+                places = (NDOF * block.nodes[:, :, None] + np.arange(NDOF)).reshape(ne, -1)
+                np.add.at(self.of_pairs, places, forces @ resultants)
+                values = fields[block.nodes].reshape(ne, 1, nodes * NDOF, -1)
+                stresses = (weight * (AB @ (linear @ values))).transpose(3, 2, 1, 0)
+                slopes = _slopes(tied, block, shapes)
+                for pair, (i, j) in enumerate(zip(first.tolist(), second.tolist(), strict=True)):
+                    on_w = _on_w(tied, stresses[i], slopes[j])
+                    if i != j:
+                        on_w = on_w + _on_w(tied, stresses[j], slopes[i])
+                    np.add.at(self.of_pairs[:, pair], NDOF * block.nodes.T + 2, on_w)
+        # In the plane the membrane is in equilibrium.
+        self.of_pairs.reshape(self._numnp, NDOF, -1)[:, :2] = 0.0
+
+    def on(self, shapes: Floats) -> Floats:
+        """Return the forces of each state on each shape (shapes, numnp, 5), (5 numnp, ...)."""
+        forces = np.zeros((self._numnp, NDOF, self._count, len(shapes)))
+        for block, tied, stresses in self._blocks:
+            slopes = _slopes(tied, block, shapes)
+            nodes = block.nodes.T
+            for state, N in enumerate(stresses):
+                for number, of_shape in enumerate(slopes):
+                    np.add.at(forces[:, 2, state, number], nodes, _on_w(tied, N, of_shape))
+        return forces.reshape(NDOF * self._numnp, -1)
+
+
+def _slopes(
+    tied: QuadraticStrains, block: ElementBlock, shapes: Floats
+) -> list[tuple[Floats, Floats]]:
+    """Return the slopes of w of each shape (shapes, numnp, 5) at the tying points."""
+    return [tied.slopes(w) for w in shapes[:, block.nodes, 2].swapaxes(1, 2)]
+
+
+def _on_w(tied: QuadraticStrains, N: Floats, slopes: tuple[Floats, Floats]) -> Floats:
+    """Return the forces on w, (nodes, ne), of a membrane force (3, points, ne) on slopes."""
+    n11, n22, n12 = tied.tied_forces(N)
+    w_1, w_2 = slopes
+    along_one = np.concatenate([w_1[:TYING] * n11, w_2[TYING:] * n12])
+    along_two = np.concatenate([w_2[:TYING] * n22, w_1[TYING:] * n12])
+    return tied.nodal_forces(along_one, along_two)
+
+
+def _few(displacements: Floats, static: Floats) -> tuple[Floats, Floats]:
+    """Return a product (rank, pairs) and few vectors that give the displacements (neq, pairs).
+
+    `static` (m,) are the amplitudes of the bending modes in the static deflection.
+    """
+    first, second = np.triu_indices(len(static))
+    size = np.abs(static[first] * static[second])
+    vectors, values, rows = np.linalg.svd(displacements * size, full_matrices=False)
+    rank = np.count_nonzero(values > IN_PLANE * values[:1])
+    return (values[:rank, None] * rows[:rank]) / size, vectors[:, :rank]
 
 
 def factor_of(quartic: Floats, static: Floats, error: float) -> Floats:
@@ -263,7 +553,7 @@ def bending_modes(plate: PlateModel, contact: Floats, count: int) -> ReducedMode
     The masses are lumped.  The masses of u and v are left out, so that u and v follow statically.
     Raises ReductionError if the plate is not held.
     """
-    return _bending_modes(plate, _at_rest(plate, contact), contact, count)
+    return _bending_modes(plate, _at_rest(plate, contact), contact, count)[0]
 
 
 def _at_rest(plate: PlateModel, contact: Floats) -> SymmetryReduction:
@@ -273,14 +563,18 @@ def _at_rest(plate: PlateModel, contact: Floats) -> SymmetryReduction:
 
 def _bending_modes(
     plate: PlateModel, reduction: SymmetryReduction, contact: Floats, count: int
-) -> ReducedModes:
-    """Compute the modes of :func:`bending_modes` in the independent dofs."""
+) -> tuple[ReducedModes, Tangent]:
+    """Compute the modes of :func:`bending_modes` in the independent dofs.
+
+    Returns them with the stiffness of these dofs.
+    """
     mass = plate.field(plate.mass, 0.0)
     mass[:, :2] = 0.0
     free = plate.mesh.equations > 0
     try:
+        tangent = Tangent(plate, reduction=reduction)
         found = _moved_modes(
-            Tangent(plate, reduction=reduction),
+            tangent,
             _independent_mass(plate, reduction, mass[free]),
             reduction.gather(contact),
             count,
@@ -288,7 +582,8 @@ def _bending_modes(
     except SingularStiffnessError as error:
         raise ReductionError(f"a reduced model needs a plate that is held: {error}") from None
     shapes = [reduction.field(shape)[free] for shape in found.shapes.T]
-    return found._replace(shapes=np.stack(shapes, axis=1))
+    static = reduction.field(found.static)[free]
+    return found._replace(shapes=np.stack(shapes, axis=1), static=static, load=contact), tangent
 
 
 def _independent_mass(plate: PlateModel, reduction: SymmetryReduction, mass: Floats) -> Floats:
@@ -378,7 +673,12 @@ def _moved_modes(
             signs = np.where(deflections[order] < 0.0, -1.0, 1.0)
             shapes = (signs * vectors[:, order]).T @ krylov
             return ReducedModes(
-                1.0 / values[order], shapes.T, np.abs(deflections[order]), compliance
+                1.0 / values[order],
+                shapes.T,
+                np.abs(deflections[order]),
+                compliance,
+                static,
+                load,
             )
         before = values[order]
     raise ReductionError(f"{count} modes did not converge; take fewer")
@@ -428,6 +728,19 @@ class Pairs(NamedTuple):
     cubic: Floats  # (m, pairs): int N_i eps_q
     quartic: Floats  # (pairs, pairs): int eps_q A eps_q, u and v held
     loads: Floats  # (independent dofs of the membrane, pairs): r
+
+    def of_first(self, modes: int) -> Pairs:
+        """Return the integrals of the first modes."""
+        cubic, loads = (of_first(modes, part) for part in (self.cubic[:modes], self.loads))
+        return Pairs(cubic, of_first(modes, of_first(modes, self.quartic).T).T, loads)
+
+
+def of_first(modes: int, values: Floats) -> Floats:
+    """Return the columns (..., pairs) of the pairs of the first modes."""
+    # With one more mode, its pair is the last of each first mode.
+    count = (math.isqrt(8 * values.shape[1] + 1) - 1) // 2
+    first, second = np.triu_indices(count)
+    return np.ascontiguousarray(values[:, (first < modes) & (second < modes)])
 
 
 def _free_in_plane(plate: PlateModel) -> PlateModel:
@@ -507,6 +820,8 @@ def _pair_strains(plate: PlateModel, block: ElementBlock, w: Floats) -> Floats:
     return np.ascontiguousarray(tied.at_points(tied_components).transpose(3, 1, 0, 2))
 
 
+# Relative difference of times that are the same but for rounding.
+SAME_TIME = 1e-12
 # Cases per matrix product.  No case depends on other cases, and the products fit the cache.
 TILE = 32
 # Largest number of evaluations of the law in a trial, and the relative error of the indentation.
@@ -529,8 +844,26 @@ def _step(plate: ReducedPlate, dt: float) -> _Step:
     return _Step((1.0 - b) / (1.0 + b), inertia / (1.0 + b), 0.5 / (dt * np.sinc(phase / np.pi)))
 
 
-def motion_struct(plate: ReducedPlate, dt: float) -> ReducedStruct:
+class StoredTimes(NamedTuple):
+    """Times at which coordinates are stored, in steps of one size, (rows,) each, ascending."""
+
+    step: Indices  # first step that ends at or after the time, from 0
+    back: Floats  # time from there to the end of the step, over the step
+
+    @classmethod
+    def of(cls, times: Floats, dt: float, steps: int) -> StoredTimes:
+        """Place times in steps; times after the last step are left out."""
+        in_steps = times / dt
+        end = np.maximum(np.ceil(in_steps * (1.0 - SAME_TIME)).astype(np.int64), 1)
+        kept = end <= steps
+        return cls(end[kept] - 1, np.maximum(end[kept] - in_steps[kept], 0.0))
+
+
+def motion_struct(
+    plate: ReducedPlate, dt: float, stored: StoredTimes | None = None
+) -> ReducedStruct:
     """Return what the compiled kernels need to move a plate by steps of one size."""
+    step, back = StoredTimes.of(np.empty(0), dt, 0) if stored is None else stored
     return ReducedStruct(
         bending=plate.bending,
         coordinates=len(plate.stiffness),
@@ -542,6 +875,9 @@ def motion_struct(plate: ReducedPlate, dt: float) -> ReducedStruct:
         deflection=plate.deflection,
         factor=tiles(plate.stacked),
         transposed=tiles(plate.stacked.T),
+        rows=len(step),
+        step=step,
+        back=back,
         **_step(plate, dt)._asdict(),
     )
 
@@ -570,6 +906,11 @@ class ReducedMotion:
             internal[:] = self.plate.internal_forces(q)
         moved = (self.plate.deflection[:, None] * self._q).sum(axis=1)
         return np.asarray(moved.ravel()[: self._cases])
+
+    def coordinates(self, back: float) -> Floats:
+        """Return the coordinates, (cases, n), at a share `back` of the last step before its end."""
+        q = (self._q - back * self._increment).swapaxes(1, 2)
+        return np.asarray(q.reshape(-1, q.shape[2])[: self._cases])
 
     def energy(self, force: Floats) -> Floats:
         """Return the energy after the last step, (cases,), under the contact forces then.

@@ -49,6 +49,14 @@ class MidplaneField(NamedTuple):
     moment_at_load: float
 
 
+class LargestOfMidplane(NamedTuple):
+    """Largest slope, strain of a face and membrane force; see :class:`MidplaneField`."""
+
+    slope: float
+    strain: float
+    force: float
+
+
 class _Midplane(NamedTuple):
     """Strains, curvatures and slopes of a block, (ne, points, components)."""
 
@@ -146,6 +154,35 @@ class Stretching:
             moment_at_load=moment_at_load,
         )
 
+    def slopes(self, field: Floats) -> Floats:
+        """Return the slopes of w at the points of a displacement field, (points, 2)."""
+        return np.concatenate(
+            [part.midplane(field).slopes.reshape(-1, 2) for part, _ in self._parts]
+        )
+
+    def largest(self, field: Floats) -> LargestOfMidplane:
+        """Return the largest values in a displacement field, (numnp, 5)."""
+        largest = [self._largest(part, part.midplane(field), near) for part, near in self._parts]
+        return LargestOfMidplane(*np.max(largest, axis=0).tolist())
+
+    def largest_linear(self, field: Floats) -> float:
+        """Return the largest strain of a face away from the load, without quadratic strains.
+
+        The strain of the preload is left out too.
+        """
+        largest = 0.0
+        for part, near in self._parts:
+            there, back = part.midplane(field), part.midplane(-field)
+            strains = (there.strains - back.strains) / 2.0
+            largest = max(largest, _largest_face(part, strains, there.curvatures, near))
+        return largest
+
+    @property
+    def preload_strain(self) -> float:
+        """Largest principal strain of the preload."""
+        parts = (part.compliance @ self._preload * [1.0, 1.0, 0.5] for part, _ in self._parts)
+        return max(float(_largest_principal(strains)) for strains in parts)
+
     def _energies(self, part: _Elements, midplane: _Midplane) -> Floats:
         """Return the energies of the membrane, of bending and of the preload."""
         A, B, D = part.laminate.A, part.laminate.B, part.laminate.D
@@ -172,15 +209,9 @@ class Stretching:
         """Return the largest slope, strain of a face away from the load, and membrane force."""
         slope = np.hypot(midplane.slopes[..., 0], midplane.slopes[..., 1])
         middle = midplane.strains + part.compliance @ self._preload
-        bent = 0.5 * part.laminate.thickness * midplane.curvatures
-        # gamma_xy is twice the tensor component.
-        faces = [
-            _largest_principal(strains * [1.0, 1.0, 0.5])
-            for strains in (middle - bent, middle + bent)
-        ]
-        strain = np.where(near, 0.0, np.maximum(*faces))
+        strain = _largest_face(part, middle, midplane.curvatures, near)
         mean, radius = principal_values(self._preload + part.forces(midplane))
-        return np.array([slope.max(), strain.max(), (mean + radius).max()])
+        return np.array([slope.max(), strain, (mean + radius).max()])
 
     def _under_load(self, field: Floats) -> tuple[float, float]:
         """Return membrane force and moment at the load, averaged over the adjacent elements.
@@ -193,6 +224,16 @@ class Stretching:
         force = np.mean([part.forces(midplane)[0, 0] for part, midplane in states], axis=0)
         moment = np.mean([part.moments(midplane)[0, 0] for part, midplane in states], axis=0)
         return float(_largest_principal(self._preload + force)), float(_largest_principal(moment))
+
+
+def _largest_face(part: _Elements, strains: Floats, curvatures: Floats, near: Bools) -> float:
+    """Return the largest absolute principal strain of both faces at points that are not near."""
+    bent = 0.5 * part.laminate.thickness * curvatures
+    # gamma_xy is twice the tensor component.
+    faces = [
+        _largest_principal(face * [1.0, 1.0, 0.5]) for face in (strains - bent, strains + bent)
+    ]
+    return float(np.where(near, 0.0, np.maximum(*faces)).max())
 
 
 def principal_values(tensor: Floats) -> tuple[Floats, Floats]:

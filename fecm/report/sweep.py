@@ -194,13 +194,15 @@ def _reduced(sweep: SweepResult) -> list[PageBlock]:
     reduced = sweep.reduced
     if reduced is None:
         return []
-    differences = [reduced.difference("peak_force"), reduced.difference(RATIO)]
+    names = {"peak_force": "peak force", RATIO: "deflection"}
+    names |= {name: name.replace("_", " ") for name in reduced.measured}
+    differences = [reduced.difference(name) for name in names]
     rows = [
         (str(case), *(share(float(value)) for value in pair))
         for case, *pair in zip(reduced.columns["case"], *differences, strict=True)
     ]
     caption = f"Reduced model with {reduced.modes} modes: differences from full runs"
-    return page_table(rows, ("case", "peak force", "deflection"), caption)
+    return page_table(rows, ("case", *names.values()), caption)
 
 
 def _case(sweep: SweepResult, case: int) -> str:

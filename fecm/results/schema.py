@@ -573,6 +573,11 @@ SWEEP_DATASETS = _by_path(
             "largest displacement under the load over the thickness, of the reduced model"),
     Dataset(f"reduced/full_{RATIO}", _TRIALS,
             "largest displacement under the load over the thickness, of the full run"),
+    Dataset("reduced/exposure", _TRIALS, "exposure that differs most, of the reduced model"),
+    Dataset("reduced/full_exposure", _TRIALS, "the same exposure of the full run"),
+    Dataset("reduced/gage_strain", _TRIALS,
+            "largest strain of a gage, with the largest difference of a gage"),
+    Dataset("reduced/full_gage_strain", _TRIALS, "largest strain of a gage of the full run"),
 )
 LOCATION_DATASETS = _by_path(
     Dataset("locate/place", ("ndm",), "place of the impact", "length"),

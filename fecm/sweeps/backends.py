@@ -6,6 +6,7 @@ response. A nonlinear plate is run in full for each impact, or reduced to some b
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -25,7 +26,7 @@ from fecm.mechanics.own_law import CaseByCase
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_model
 from fecm.problem.problem import Problem
-from fecm.results.metrics import GAGE, Projectiles, impact_metrics
+from fecm.results.metrics import BAND, EXPOSURES, GAGE, Projectiles, impact_metrics
 from fecm.sweeps.checks import ADVANCED_BYTES
 from fecm.sweeps.impact_columns import Impacts
 from fecm.sweeps.in_full import (
@@ -36,7 +37,8 @@ from fecm.sweeps.in_full import (
     whole_force,
 )
 from fecm.sweeps.outcome import Outcome, merge, outcome_of
-from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
+from fecm.sweeps.recovered import NOTHING, Measured, Recovery, Rows
+from fecm.sweeps.reduced import ReducedImpacts, by_halvings, impacts_on, reduced
 from fecm.sweeps.responses import (
     ComputedImpacts,
     Hits,
@@ -50,6 +52,8 @@ from fecm.sweeps.task import Measure
 # Contact forces that are computed before they are evaluated, where none are stored: 16 MB, which
 # the C library keeps for the next ones and does not give back to the system.
 FORCES = 2_000_000
+# Coordinates of a reduced plate that are stored before they are evaluated: 32 MB.
+MOST_STORED = 4_000_000
 
 
 def only_impacts(checked: Problem, names: Collection[str] = ()) -> bool:
@@ -125,6 +129,7 @@ class BendingModes:
     measures: Sequence[Measure]
     modes: int
     history: bool = True
+    longer_than: BendingModes | None = None  # the same plate in the program of the deck
     computes_together = True
 
     @property
@@ -139,24 +144,43 @@ class BendingModes:
 
     @cached_property
     def plate(self) -> ReducedImpacts:
-        """The reduced plate; CasesError if it can't be reduced."""
+        """Impacts on the reduced plate; CasesError if it can't be reduced."""
+        if self.longer_than is not None:
+            return impacts_on(self.longer_than.plate.plate, self.problem)
         return reduced(self.problem, self.modes)
+
+    @cached_property
+    def recovery(self) -> Recovery:
+        """Evaluator of the plate's displacement fields."""
+        if self.longer_than is not None:
+            return self.longer_than.recovery
+        fields = self.plate.plate.fields
+        assert fields is not None
+        return Recovery(self.problem, self.measures, fields)
 
     def outcomes(self, impacts: Impacts, *, judged: bool = True) -> Outcome:
         """Compute impacts, together if their time steps are halved as often."""
         parts = []
         for times, rows in by_halvings(self.plate, impacts).items():
-            plate, chosen = self.plate.halved(times), impacts.select(rows)
-            parts.append(
-                _outcome_together(
-                    self.problem, plate, self.measures, chosen, judged, history=self.history
+            plate = ReducedResponse(self.plate.halved(times), self.recovery if judged else None)
+            for some in np.array_split(rows, math.ceil(len(rows) / plate.most_cases)):
+                parts.append(
+                    _outcome_together(
+                        self.problem,
+                        plate,
+                        self.measures,
+                        impacts.select(some),
+                        judged,
+                        history=self.history,
+                    )
                 )
-            )
-        return merge(parts)
+        return merge(parts, history=self.history)
 
     def lengthened(self, factor: float) -> BendingModes:
         """Return the back end of a run `factor` times as long."""
-        return replace(self, problem=lengthened(self.problem, factor)) if factor != 1 else self
+        if factor == 1:
+            return self
+        return replace(self, problem=lengthened(self.problem, factor), longer_than=self)
 
 
 @dataclass
@@ -203,6 +227,54 @@ class PlateResponse(NamedTuple):
         """Compute many impacts."""
         return impacts(self.response, self.dt, self.node_mass, hits, self.mobility)
 
+    def measured(self, struck: ComputedImpacts, rows: Impacts) -> Measured:
+        """Measure the gages in many impacts."""
+        sums = ((name, largest_sums(r, struck.force)) for name, r in self.strains.items())
+        return Measured({name: CasePeaks(*values) for name, values in sums}, {}, {})
+
+
+@dataclass(frozen=True)
+class ReducedResponse:
+    """Impacts on a reduced plate, and what is measured in them; nothing without `recovery`."""
+
+    plate: ReducedImpacts
+    recovery: Recovery | None
+
+    @property
+    def dt(self) -> float:
+        """Time step."""
+        return self.plate.dt
+
+    @property
+    def steps(self) -> int:
+        """Number of steps."""
+        return self.plate.steps
+
+    @cached_property
+    def rows(self) -> Rows | None:
+        """Times at which the coordinates of the plate are needed."""
+        return None if self.recovery is None else self.recovery.rows(self.dt, self.steps)
+
+    @property
+    def most_cases(self) -> int:
+        """Number of cases whose coordinates are stored at once."""
+        if self.rows is None:
+            return MOST_STORED
+        a_case = len(self.rows.times) * len(self.plate.plate.stiffness)
+        return max(1, MOST_STORED // max(a_case, 1))
+
+    def impacts(self, hits: Hits) -> ComputedImpacts:
+        """Compute many impacts."""
+        times = None if self.rows is None else self.rows.times
+        return replace(self.plate, times=times).impacts(hits)
+
+    def measured(self, struck: ComputedImpacts, rows: Impacts) -> Measured:
+        """Measure many impacts."""
+        if self.recovery is None or self.rows is None or struck.coordinates is None:
+            return NOTHING
+        decks = [rows.plate(row) for row in range(len(rows))]
+        return self.recovery.measured(self.rows, struck.coordinates, struck.force, self.dt, decks)
+
 
 def _plate_response(checked: Problem, *, gages: bool) -> PlateResponse:
     setup = build_model(checked)
@@ -230,6 +302,7 @@ class _ByKind(NamedTuple):
     """Impacts sorted by the kind of their projectile."""
 
     numbers: list[int]
+    rows: Impacts
     hits: Hits
     projectiles: Projectiles
     toughness: Floats
@@ -244,6 +317,7 @@ def _by_kind(impacts: Impacts) -> _ByKind:
         law = CaseByCase(rows.own_law, len(rows))
     return _ByKind(
         numbers=rows.numbers,
+        rows=rows,
         hits=Hits(rows.kinds, rows.kind, rows.scale, law, rows.velocity),
         projectiles=Projectiles(rows.mass, rows.velocity),
         toughness=rows.toughness,
@@ -253,7 +327,7 @@ def _by_kind(impacts: Impacts) -> _ByKind:
 
 def _outcome_together(
     checked: Problem,
-    plate: PlateResponse | ReducedImpacts,
+    plate: PlateResponse | ReducedResponse,
     measures: Sequence[Measure],
     impacts: Impacts,
     judged: bool,
@@ -277,8 +351,7 @@ def _outcome_together(
             checked.symmetry.factor,
             checked.judge.plate_mass,
         )
-        strains = plate.strains if judged else {}
-        peaks = {name: CasePeaks(*largest_sums(r, struck.force)) for name, r in strains.items()}
+        measured = plate.measured(struck, ordered.rows) if judged else NOTHING
     outcome = outcome_of(
         ordered.numbers,
         metrics,
@@ -289,7 +362,21 @@ def _outcome_together(
         force=whole_force(struck.force.T, checked.symmetry.factor) if history else None,
     )
     largest = struck.indentation.largest
-    judge_cases(outcome, checked, measures, metrics, peaks=peaks, indentation=largest)
+    judge_cases(
+        outcome,
+        checked,
+        measures,
+        metrics,
+        peaks=measured.peaks,
+        indentation=largest,
+        largest=measured.largest,
+    )
+    columns = outcome.columns
+    columns |= measured.columns
+    # An exposure that is open has no band.
+    exposures = [columns[name] for name in EXPOSURES if name in measured.peaks]
+    for name in BAND if exposures else ():
+        columns[name] = np.where(np.isnan(exposures).any(axis=0), np.nan, columns[name])
     outcome = outcome.select(ordered.back)
 
     settled = (struck.error < ENERGY_BALANCE.value) & (struck.unconverged_steps == 0)

@@ -50,7 +50,11 @@ EXCLUSIONS = (
     Exclusion("until", ("build", FUNCTION), "a search varies the velocity of the deck"),
     Exclusion("until", ("full",), "run the velocity found: `vary` velocity=FOUND and `full` 0"),
     Exclusion(PEAK, (FAILURE,), "exposures need full runs, and this search takes none"),
-    Exclusion("model", ("build", FUNCTION), "the reduced model has forces and deflections only"),
+    Exclusion(
+        "model",
+        ("build", FUNCTION),
+        "the reduced model is of one deck, and stores no result for a function",
+    ),
     Exclusion("model", ("until",), "searches take full runs"),
     Exclusion("scheduler", ("executor", SEVERAL), "the cases are computed in one place"),
     Exclusion("executor", (SEVERAL,), "the cases are computed in one place"),

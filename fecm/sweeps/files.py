@@ -220,8 +220,8 @@ def write_sweep(
             sink.store(name, column)
         if result.reduced is not None:
             sink.attributes(reduced.GROUP, reduced.reduced_attributes(result.reduced))
-            for name in reduced.TRIAL_COLUMNS:
-                sink.store(f"{reduced.GROUP}/{name}", result.reduced.columns[name])
+            for name, column in result.reduced.columns.items():
+                sink.store(f"{reduced.GROUP}/{name}", column)
         for name, limit in result.convergence.items():
             sink.attributes(f"convergence/{name}", vars(limit))
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fecm._typing import Bools, Floats, Indices
 from fecm.authoring.case import Case, CasesError
 from fecm.authoring.strike_values import Strike, strike_of
-from fecm.authoring.values import FAILURE_NAMES, OF_PLATE, strike_of_case
+from fecm.authoring.values import FAILURE_NAMES, OF_PLATE, strike_of_case, with_exposure_values
 from fecm.deck import model
 from fecm.deck.model import Deck
 from fecm.mechanics.contact_law import ContactParameters, Law, stack_parameters
@@ -46,6 +46,7 @@ class Impacts:
     factor: int  # symmetric parts of the plate, of which the deck has one with its part of the mass
     own_law: Law | None  # contact law of the user, instead of the constants
     cards: Callable[[int], Strike]  # impact of a row as cards
+    plate: Callable[[int], Deck]  # deck of the plate, with the strengths of a row
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -82,6 +83,7 @@ class Impacts:
             scale=self.scale[rows],
             toughness=self.toughness[rows],
             cards=lambda row: self.cards(int(rows[row])),
+            plate=lambda row: self.plate(int(rows[row])),
         )
 
 
@@ -136,6 +138,7 @@ def impacts_from_cards(
         factor=factor,
         own_law=own_law,
         cards=rows.__getitem__,
+        plate=lambda row: rows[row].plate,
     )
 
 
@@ -160,6 +163,7 @@ def _from_values(
         numbers=list(numbers),
         own_law=own_law,
         cards=lambda row: strike_of_case(checked.deck, cases[row]),
+        plate=lambda row: with_exposure_values(checked.deck, cases[row]),
     )
     if len(rows) == len(cases):
         return impacts
@@ -218,6 +222,7 @@ def _columns(
         factor=factor,
         own_law=None,
         cards=lambda row: strike,
+        plate=lambda row: strike.plate,
     )
     return columns, valid
 

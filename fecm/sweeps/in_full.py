@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,15 +19,16 @@ from fecm.deck.model import Deck, Macro
 from fecm.deck.units import unit_names
 from fecm.judge.end import decided
 from fecm.judge.exposures import band_of_largest
-from fecm.judge.limits import EXPOSURE, INDENTATION, THRESHOLD
+from fecm.judge.limits import EXPOSURE, INDENTATION, THRESHOLD, ModelLimit
 from fecm.judge.validity import Extent, reasons_of
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.laminate import threshold_force
 from fecm.mechanics.own_law import LawError
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.build import RunOptions
 from fecm.problem.loading import LoadedDeck, load_deck
-from fecm.problem.parts import strengths_of_deck
+from fecm.problem.parts import residuals_of_deck, strengths_of_deck
 from fecm.problem.problem import Problem
 from fecm.results.exposures import count_evaluations, largest_exposures
 from fecm.results.metrics import (
@@ -51,6 +53,9 @@ from fecm.simulation.run import run_program
 from fecm.simulation.simulation import Criteria, Observer, Simulation
 from fecm.sweeps.outcome import About, Outcome, outcome_of
 from fecm.sweeps.task import BuildFunction, Measure, MeasureFunction, Plan, Settings
+
+if TYPE_CHECKING:
+    from fecm.mechanics.failure_monitor import FailureMonitor
 
 
 class CasePeaks(NamedTuple):
@@ -82,11 +87,13 @@ def judge_cases(
     peaks: Mapping[str, CasePeaks],
     indentation: Floats,
     of_rows: Collection[str] = (),
+    largest: Mapping[ModelLimit, Floats] = MappingProxyType({}),
 ) -> None:
     """Add the validity of cases, and the measured columns with their open values.
 
     `peaks` has the strains of gages and the exposures, `indentation` (cases,) the largest values.
-    `of_rows` has the reasons from the stored rows of a full run.
+    `of_rows` has the reasons from the stored rows of a full run, `largest` the largest values in
+    the rows of cases that are computed together.
     """
     rules, end, plate = checked.judge, metrics.end, metrics.plate
     decided_values = {name: decided(peak.largest, peak.last, end) for name, peak in peaks.items()}
@@ -101,6 +108,7 @@ def judge_cases(
             INDENTATION: indentation,
             EXPOSURE: np.nanmax(exposures, axis=0) if exposures else np.nan,
             THRESHOLD: outcome.columns[About.REACHED],
+            **largest,
         },
         threshold=metrics.columns.get(THRESHOLD_FORCE, np.nan),
         of_rows=of_rows,
@@ -245,16 +253,19 @@ def as_run(
 
 def _criteria(simulation: Simulation, checked: Problem) -> Criteria:
     """Return failure criteria of plies with the residual stresses and strengths of another case."""
-    monitor, residuals = simulation.model.failure, checked.residuals
-    assert monitor is not None
-    with_residual = monitor.with_residual(
-        None if residuals is None else [residual.stresses for residual in residuals],
-        strengths_of_deck(checked.deck),
-    )
+    assert simulation.model.failure is not None
+    with_residual = criteria_of_deck(simulation.model.failure, checked.deck, checked.plate)
     envelope = with_residual.start()
     if simulation.model.is_stressed_at_rest:
         with_residual.update(envelope, np.zeros((1, *checked.mesh.equations.shape)), [0.0])
     return Criteria(with_residual, envelope)
+
+
+def criteria_of_deck(monitor: FailureMonitor, deck: Deck, plate: PlateModel) -> FailureMonitor:
+    """Return a monitor with residual stresses and strengths of another deck of its plate."""
+    residuals = residuals_of_deck(deck, plate.laminates)
+    stresses = None if residuals is None else [residual.stresses for residual in residuals]
+    return monitor.with_residual(stresses, strengths_of_deck(deck))
 
 
 def _outcome(

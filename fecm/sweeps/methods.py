@@ -54,7 +54,6 @@ from fecm.sweeps.reduced import MOST_MODES, reduction_bytes, tasks_beside_full_r
 from fecm.sweeps.search import FIRST_VELOCITIES, Sought, search
 from fecm.sweeps.task import (
     MOST_TOGETHER,
-    Measure,
     Method,
     Plan,
     Prepared,
@@ -169,11 +168,6 @@ class ReducedRuns(SharedPlate):
             )
         if not (isinstance(modes, int) and 1 <= modes <= MOST_MODES):
             return f"the reduced model takes 1 to {MOST_MODES} bending modes, not {modes!r}"
-        if {*settings.measures} - {Measure.DEFLECTION}:
-            return (
-                "the reduced model has forces and deflections only, of a deck: no build, and none "
-                "of measure but max_deflection"
-            )
         if REFINE in names or "dt" in names:
             return "the reduced model has a time step of its own: dt and refine can't vary"
         if checked.plate.lifts:

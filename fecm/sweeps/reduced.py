@@ -20,8 +20,7 @@ from fecm._table import Row
 from fecm._typing import Floats, Indices
 from fecm._watch import Watch
 from fecm.authoring.case import CasesError
-from fecm.authoring.strike_values import Strike
-from fecm.authoring.time_values import duration_of
+from fecm.authoring.time_values import step_of
 from fecm.authoring.values import strike_of_case
 from fecm.mechanics.contact_law import ContactPoint
 from fecm.mechanics.impact import ContactState, couple_step
@@ -34,13 +33,14 @@ from fecm.mechanics.reduced_plate import (
     ReducedPlate,
     ReductionError,
     SeriesLaw,
+    StoredTimes,
     bytes_of_pairs,
     motion_struct,
     reduced_plate,
 )
 from fecm.problem.memory import factor_bytes
 from fecm.problem.problem import Problem
-from fecm.results.metrics import RATIO, IndentationMetrics
+from fecm.results.metrics import EXPOSURES, GAGE, RATIO, IndentationMetrics
 from fecm.results.schema import SWEEP_DATASETS
 from fecm.sweeps.impact_columns import Impacts
 from fecm.sweeps.outcome import About, Column, Outcome, merge
@@ -81,11 +81,7 @@ class ReducedImpacts:
     plate: ReducedPlate
     dt: float
     steps: int
-
-    @property
-    def strains(self) -> dict[str, Floats]:
-        """Responses of strain gages, which this model does not have."""
-        return {}
+    times: Floats | None = None  # (rows,): times at which the coordinates are stored, ascending
 
     def halved(self, times: int) -> ReducedImpacts:
         """Return these impacts with a time step that is halved `count` times."""
@@ -94,9 +90,17 @@ class ReducedImpacts:
     def impacts(self, hits: Hits) -> ComputedImpacts:
         """Compute impacts."""
         if (constants := known_constants(hits.law)) is not None:
-            kernel = partial(sweep_reduced, motion_struct(self.plate, self.dt))
-            return by_kernel(kernel, self.steps, self.dt, hits, constants)
+            stored = self.stored
+            kernel = partial(sweep_reduced, motion_struct(self.plate, self.dt, stored))
+            shape = len(stored.step), len(self.plate.stiffness)
+            return by_kernel(kernel, self.steps, self.dt, hits, constants, stored=shape)
         return self.by_numpy(hits)
+
+    @property
+    def stored(self) -> StoredTimes:
+        """Steps in which the stored times lie."""
+        times = np.empty(0) if self.times is None else self.times
+        return StoredTimes.of(times, self.dt, self.steps)
 
     def by_numpy(self, hits: Hits) -> ComputedImpacts:
         """Compute impacts step by step, all cases together."""
@@ -117,8 +121,12 @@ class ReducedImpacts:
         force, deepest, w, work = np.empty((self.steps, cases)), none, none, none
         record = DeflectionRecord(tips)
         done: list[Floats] = []
+        ends, backs = self.stored
+        coordinates = np.empty((cases, len(ends), len(self.plate.stiffness)))
         for step in range(self.steps):
             moved = motion.advance(state.contact.force)
+            for row in np.flatnonzero(ends == step):
+                coordinates[:, row] = motion.coordinates(float(backs[row]))
             (tips.sums,) = sums.next()
             couple_step(tips, law, state, moved)
             sums.give(state.contact.force)
@@ -138,58 +146,71 @@ class ReducedImpacts:
             unconverged_steps=state.unconverged_steps,
             plate=record.deflection,
             error=balance_errors(force, Work(np.array(done), none), tips),
+            coordinates=coordinates,
         )
 
 
 def reduced(checked: Problem, modes: int) -> ReducedImpacts:
+    """Return impacts on the plate of a problem, reduced to bending modes.
+
+    Raises CasesError if that is not possible.
+    """
+    return impacts_on(reduced_to(checked, modes), checked)
+
+
+def impacts_on(plate: ReducedPlate, checked: Problem) -> ReducedImpacts:
+    """Return impacts on a reduced plate, as long as those of a problem."""
+    duration = step_of(checked) * checked.work.steps
+    steps = math.ceil(duration * plate.fastest / PLATE_PHASE)
+    return ReducedImpacts(plate, duration / steps, steps)
+
+
+def reduced_to(checked: Problem, modes: int) -> ReducedPlate:
     """Reduce the plate of a problem to bending modes.
 
     Raises CasesError if that is not possible.
     """
     assert checked.contact is not None  # the program has impact steps
     try:
-        plate = reduced_plate(checked.plate, checked.contact, modes, checked.damping)
+        return reduced_plate(
+            checked.plate, checked.contact, modes, checked.damping, has_fields=True
+        )
     except ReductionError as error:
         raise CasesError(str(error)) from None
-    duration = duration_of(checked)
-    steps = math.ceil(duration * plate.fastest / PLATE_PHASE)
-    return ReducedImpacts(plate, duration / steps, steps)
 
 
 def by_halvings(model: ReducedImpacts, impacts: Impacts) -> Mapping[int, Indices]:
     """Group rows of impacts by the halvings of the time step that resolve their contact."""
-    groups: dict[int, list[int]] = {}
-    for row in range(len(impacts)):
-        step = largest_time_step(model.plate, impacts.cards(row))
-        largest = max(step, model.dt / 2**MOST_HALVINGS)
-        times = max(0, math.ceil(math.log2(model.dt / largest)))
-        groups.setdefault(times, []).append(row)
-    return {times: np.array(rows) for times, rows in groups.items()}
+    largest = np.maximum(largest_time_steps(model.plate, impacts), model.dt / 2**MOST_HALVINGS)
+    times = np.maximum(0, np.ceil(np.log2(model.dt / largest))).astype(int)
+    return {number: np.flatnonzero(times == number) for number in np.unique(times).tolist()}
 
 
-def largest_time_step(plate: ReducedPlate, strike: Strike) -> float:
-    """Return the largest time step that resolves the contact; infinite at velocity 0.
+def largest_time_steps(plate: ReducedPlate, impacts: Impacts) -> Floats:
+    """Return the largest time steps that resolve the contacts, (rows,); infinite at velocity 0.
 
     The contact is at most as stiff as at the force that all of the energy would give, in loading or
     unloading, and in series with the omitted modes.
     """
-    law, energy = strike.law, strike.energy
+    law, energy = impacts.constants, 0.5 * impacts.mass * impacts.velocity**2
     force = (2.5 * energy * law.k ** (2.0 / 3.0)) ** 0.6  # of (2/5) F^(5/3)/k^(2/3)
     indentation = (force / law.k) ** (2.0 / 3.0)
-    if not indentation > 0.0:
-        return math.inf
-    width = indentation - float(law.permanent(indentation))
-    compliance = min(indentation / 1.5, width / law.q) / force + plate.flexibility
+    with np.errstate(divide="ignore", invalid="ignore"):
+        width = indentation - law.permanent(indentation)
+        compliance = np.minimum(indentation / 1.5, width / law.q) / force + plate.flexibility
     mobility = float((plate.deflection**2).sum())
-    return min(
-        PLATE_PHASE * math.sqrt(compliance / mobility),
-        PROJECTILE_PHASE * math.sqrt(compliance * strike.projectile.total_mass),
-        strike.projectile.element_time,
-    )
+    element_times = np.array([kind.element_time for kind in impacts.kinds])[impacts.kind]
+    steps = [
+        PLATE_PHASE * np.sqrt(compliance / mobility),
+        PROJECTILE_PHASE * np.sqrt(compliance * impacts.mass),
+        element_times,
+    ]
+    return np.where(indentation > 0.0, np.minimum.reduce(steps), np.inf)
 
 
 GROUP = "reduced"
 LIMIT = 0.02  # largest difference of the peaks, relative to the full run
+MEASURED_TRIALS = ("exposure", "gage_strain")
 TRIAL_COLUMNS = tuple(d.name for d in SWEEP_DATASETS.values() if d.group == GROUP)
 
 
@@ -204,7 +225,8 @@ class ReducedModel:
     columns : dict of ndarray (n,)
         Columns of the cases that were also run in full: ``case``, their numbers; ``peak_force`` and
         ``deflection_ratio`` by the model; ``full_peak_force`` and ``full_deflection_ratio`` by the
-        full runs.
+        full runs. Where they are measured, ``exposure`` and ``gage_strain`` are those of the
+        criterion and of the gage that differ most.
     in_full : int
         Number of cases, with the largest energies, that were run in full because the model differs
         too much.
@@ -226,20 +248,28 @@ class ReducedModel:
     def rows(self) -> Iterator[Row]:
         """Yield the rows about the model for the summary of the sweep."""
         yield ("reduced model", f"{self._modes} of bending; difference from full runs:")
-        rows = zip(
-            self.columns["case"], self.difference("peak_force"), self.difference(RATIO), strict=True
-        )
-        for case, peak, w in rows:
-            of_w = "open" if np.isnan(w) else f"{w:+.3%}"
-            yield ("", f"peak {peak:+.2%}, w {of_w} (case {case})")
+        brief = {"peak_force": ("peak", 2), RATIO: ("w", 3)}
+        brief |= {name: (name.replace("_", " "), 2) for name in self.measured}
+        differences = [self.difference(name) for name in brief]
+        for case, *values in zip(self.columns["case"], *differences, strict=True):
+            parts = [
+                f"{word} open" if np.isnan(value) else f"{word} {value:+.{digits}%}"
+                for (word, digits), value in zip(brief.values(), values, strict=True)
+            ]
+            yield ("", f"{', '.join(parts)} (case {case})")
         if self.in_full:
             cases = "1 case" if self.in_full == 1 else f"{self.in_full} cases"
             yield ("", f"{cases} of the largest energies: in full, as above {LIMIT:.0%}")
-        yield ("", "slopes and strains are not judged")
+
+    @property
+    def measured(self) -> list[str]:
+        """Names of the measured quantities that were compared."""
+        return [name for name in MEASURED_TRIALS if name in self.columns]
 
     def check(self) -> None:
-        """Raise CasesError if a peak differs by more than the limit."""
-        if not np.abs(self.difference("peak_force")).max() <= LIMIT:
+        """Raise CasesError if a quantity differs by more than the limit."""
+        name, _ = self._worst
+        if not abs(self.difference(name)).max() <= LIMIT:
             remedy = "take more modes, or full runs (leave out the reduced model)"
             if self.modes >= MOST_MODES:
                 remedy = "these are all its modes; take full runs: leave out the reduced model"
@@ -254,12 +284,23 @@ class ReducedModel:
 
     @property
     def _misfit(self) -> str:
-        """Largest difference of a peak force."""
-        peaks = self.difference("peak_force")
-        worst = int(np.abs(peaks).argmax())
+        """Largest difference of a quantity."""
+        name, worst = self._worst
         return (
-            f"the peak force of the reduced model with {self._modes} differs by "
-            f"{peaks[worst]:+.1%} from the full run of case {self.columns['case'][worst]}"
+            f"the {name.replace('_', ' ')} of the reduced model with {self._modes} differs by "
+            f"{self.difference(name)[worst]:+.1%} from the full run of case "
+            f"{self.columns['case'][worst]}"
+        )
+
+    @property
+    def _worst(self) -> tuple[str, int]:
+        """Quantity with the largest difference, and its row."""
+        rows = {
+            name: int(np.nan_to_num(np.abs(self.difference(name))).argmax())
+            for name in ("peak_force", *self.measured)
+        }
+        return max(
+            rows.items(), key=lambda item: np.nan_to_num(abs(self.difference(item[0])[item[1]]))
         )
 
 
@@ -314,7 +355,10 @@ class Trials:
                 self._models[case] = outcomes[model_task.number]
         full, model = self._merged()
         forces = [part.columns[About.REACHED] for part in (model, full)]
-        holds = ~full.fine | (model.fine & (np.abs(forces[0] - forces[1]) <= LIMIT * forces[1]))
+        fits = np.abs(forces[0] - forces[1]) <= LIMIT * forces[1]
+        for modelled, in_full in measured_pairs(model, full).values():
+            fits &= ~(np.abs(modelled - in_full) > LIMIT * in_full)  # open values fit
+        holds = ~full.fine | (model.fine & fits)
         return {number for number, part in zip(full.numbers, holds, strict=True) if not part}
 
     def _merged(self) -> tuple[Outcome, Outcome]:
@@ -397,8 +441,39 @@ def compared(modes: int, full: Outcome, model: Outcome) -> ReducedModel:
             "full_peak_force": full.columns[About.REACHED],
             RATIO: model.columns[RATIO],
             f"full_{RATIO}": full.columns[RATIO],
+            **{
+                f"{prefix}{name}": values
+                for name, pair in measured_pairs(model, full).items()
+                for prefix, values in zip(("", "full_"), pair, strict=True)
+            },
         },
     )
+
+
+def measured_pairs(model: Outcome, full: Outcome) -> dict[str, tuple[Floats, Floats]]:
+    """Return the exposure, and the strain of a gage, that differ most in each case.
+
+    They are those by the model and by the full runs. Differences of gages are compared with the
+    largest strain of all gages, so that a gage which is hardly strained does not count.
+    """
+    pairs = {}
+    gages = [name for name in full.columns if name.startswith(GAGE)]
+    exposures = [name for name in EXPOSURES if name in full.columns]
+    for quantity, names in zip(MEASURED_TRIALS, (exposures, gages), strict=True):
+        names = [name for name in names if name in model.columns]
+        if not names:
+            continue
+        of_model, in_full = (
+            np.array([part.columns[name] for name in names]) for part in (model, full)
+        )
+        if quantity == "gage_strain":
+            least = np.nanmax(in_full, axis=0, initial=0.0)
+            of_model, in_full = of_model + (least - in_full), np.broadcast_to(least, in_full.shape)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            worst = np.nan_to_num(np.abs(of_model / in_full - 1.0)).argmax(axis=0)
+        rows = np.arange(len(worst))
+        pairs[quantity] = of_model[worst, rows], in_full[worst, rows]
+    return pairs
 
 
 def reduced_attributes(model: ReducedModel) -> dict[str, Any]:
@@ -417,7 +492,11 @@ def reduced_of(contents: FileContents) -> ReducedModel | None:
     try:
         modes = int(contents.groups[GROUP]["modes"])
         in_full = int(contents.groups[GROUP].get("in_full", 0))
-        columns = {name: contents[f"{GROUP}/{name}"] for name in TRIAL_COLUMNS}
+        columns = {
+            name: contents[f"{GROUP}/{name}"]
+            for name in TRIAL_COLUMNS
+            if name.removeprefix("full_") not in MEASURED_TRIALS or f"{GROUP}/{name}" in contents
+        }
     except (KeyError, ValueError, TypeError) as error:
         message = f"{contents.path}: what is stored of the reduced model is incomplete ({error})"
         raise ResultFileError(message) from None

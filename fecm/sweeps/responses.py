@@ -266,6 +266,7 @@ class ComputedImpacts(NamedTuple):
     unconverged_steps: NDArray[np.int64]  # (cases,): steps whose contact iteration did not converge
     plate: Deflection
     error: Floats  # (cases,): error of the energy balance; see :func:`balance_errors`
+    coordinates: Floats | None = None  # (cases, rows, n): of a reduced plate at its stored times
 
 
 class Work(NamedTuple):
@@ -425,10 +426,12 @@ def by_kernel(
     hits: Hits,
     constants: ContactParameters[Floats],
     node_mass: float = 0.0,
+    stored: tuple[int, int] | None = None,
 ) -> ComputedImpacts:
     """Compute impacts by a compiled kernel, and projectiles by their modes.
 
     `node_mass` is that of :func:`impacts`; it is 0 where the kernel knows the energy of the plate.
+    `stored` are the rows and the number of coordinates that the kernel stores.
     """
     law = kernel_law(constants)
     rows: dict[Given, float | Floats] = {
@@ -442,6 +445,7 @@ def by_kernel(
     inputs = np.stack(np.broadcast_arrays(*(rows[row] for row in Given)))
     cases = len(hits.speed)
     force, results = np.empty((cases, steps)), np.empty((len(ResultRow), cases))
+    coordinates = None if stored is None else np.empty((cases, *stored))
     starts = np.searchsorted(hits.kind, np.arange(len(hits.rods) + 1)).tolist()
     for rod, first, last in zip(hits.rods, starts[:-1], starts[1:], strict=True):
         step = WilsonStep(rod.stiffness(), rod.mass(), dt, rigid=rod.rigid)
@@ -454,6 +458,7 @@ def by_kernel(
                 inputs[:, chosen],
                 force[chosen],
                 results[:, chosen],
+                None if coordinates is None else coordinates[chosen],
             )
         )
     lost = results[ResultRow.LOST] + node_mass * results[ResultRow.LARGEST_DDW] ** 2 / (8.0 * dt**2)
@@ -475,4 +480,5 @@ def by_kernel(
             compliance=results[ResultRow.COMPLIANCE],
         ),
         error=lost / np.where(initial > 0.0, initial, 1.0),
+        coordinates=coordinates,
     )

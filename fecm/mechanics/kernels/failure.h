@@ -152,9 +152,16 @@ INLINE void NAME(four_states)(const Exposures *m, const Limits *limits, int prun
 INLINE void NAME(plies)(const Exposures *m, const Plies *f, int strains, double now) {
     const int64_t width = f->width;
     const Limits limits = limits_of(&f->ply);
+    double least = HUGE_VAL; /* of the largest exposures */
+    for (int i = 0; i < CRITERIA; i++) least = isnan(m->largest.exposure[i]) ? 0.0 : fmin(least, m->largest.exposure[i]);
     for (int64_t point = 0; point < f->points; point++) {
         const int64_t row = f->row ? f->row[point] : point;
         const double *e = m->strain + strains * row;
+        if (f->bound) {
+            double most = f->rest;
+            for (int k = 0; k < strains; k++) most += fabs(e[k]) * f->bound[k];
+            if (!m->counts[row] || most < KEEP * least) continue;
+        }
         for (int64_t four = 0; four < f->states; four += 4) {
             const int64_t first = NAME(first_of_four)(four, f->states);
             half s[3];
@@ -200,13 +207,29 @@ INLINE void NAME(interfaces)(const Exposures *m, const Interfaces *f, int strain
     }
 }
 
+/* Largest absolute principal strain of both faces. */
+INLINE double NAME(largest_face)(const Exposures *m, double largest) {
+    for (int64_t point = 0; point < m->points; point++) {
+        const double *e = m->strain + 6 * point, half = m->half[point];
+        for (int side = -1; side < 2 && half > 0.0; side += 2) {
+            const double z = side * half, xx = e[0] + z * e[3], yy = e[1] + z * e[4], xy = e[2] + z * e[5];
+            const double size = 0.5 * (fabs(xx + yy) + sqrt((xx - yy) * (xx - yy) + xy * xy));
+            if (size > largest) largest = size;
+        }
+    }
+    return largest;
+}
+
 INLINE void NAME(evaluate)(const Exposures *m, const double *u, int strains, double now) {
+    if (!m->families) memcpy(m->strain, u, sizeof *u * strains * m->points);
     for (int64_t i = 0; i < m->families; i++) NAME(midplane)(m->family + i, u, strains, m->strain, m->gradient);
+    if (m->half) *m->face = NAME(largest_face)(m, *m->face);
     for (int64_t i = 0; i < m->runs; i++) NAME(plies)(m, m->run + i, strains, now);
     for (int64_t i = 0; i < m->zones; i++) NAME(interfaces)(m, m->zone + i, strains, now);
 }
 
-/* Raise the exposures to the exposures of a displacement field, (numnp, 5). */
+/* Raise the exposures to the exposures of a displacement field, (numnp, 5); without families to those of the
+ * strains at the points, (points, strains). */
 TARGET void NAME(failure)(const Exposures *m, const double *u, double now) {
     if (m->strains == 6)
         NAME(evaluate)(m, u, 6, now);

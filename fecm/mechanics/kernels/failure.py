@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from copy import copy
 from ctypes import POINTER, c_double, c_int64
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -67,6 +68,10 @@ class PliesStruct(Structure):
         ("ply", PlyStruct),
         ("prunes", c_int64),  # whether states that cannot rise are not evaluated
         ("pucks", c_int64),  # whether Puck's criterion is evaluated
+        # Where only the largest exposures matter: bound of all exposures per absolute strain,
+        # (strains,), and the bound without strain.
+        ("bound", Doubles),
+        ("rest", c_double),
     )
 
 
@@ -140,6 +145,8 @@ class ExposuresStruct(Structure):
         ("largest", LargestStruct),
         ("strain", Doubles),
         ("gradient", Doubles),
+        ("half", Doubles),  # (points,): half thickness, 0 near the load; or not set
+        ("face", Doubles),  # (1,): largest absolute principal strain of both faces so far
     )
 
 
@@ -168,6 +175,24 @@ def _ply(p: Strengths) -> PlyStruct:
     )
 
 
+def _bounds(p: Strengths) -> Floats:
+    """Return numbers (3,) whose sum with absolute stresses bounds the exposures of all criteria.
+
+    The exposures are sublinear, but for Puck's.  His mode C holds up to the shear stress
+    critical/resistance |s2|, so that its quotient has a bound too.
+    """
+    resistance, critical = puck_limits(p)
+    pull = puck_slope(p) / p.s12
+    shear = p.yc / (2.0 * (p.s12 + p.p_minus * resistance)) ** 2
+    return np.array(
+        [
+            1.0 / min(p.xt, p.xc),
+            max(1.0 / min(p.yt, p.yc), abs(1.0 / p.yt - pull) + abs(pull)),
+            max(1.0 / p.s12, shear * critical / resistance),
+        ]
+    )
+
+
 def _prunes(p: Strengths) -> bool:
     """Return whether rounding of exposures is far below the kernels' tolerance of ties."""
     ratio = max(p.xt / p.xc, p.xc / p.xt, p.yt / p.yc, p.yc / p.yt)
@@ -181,6 +206,7 @@ class _Kept:
     monitor: CompiledMonitor
     structure: ExposuresStruct
     strain: Floats  # (elements, points, strains): strains of the last displacement
+    face: Floats  # (1,)
     held: list[Structure]  # structures in the arrays of structures, which must live as long
 
 
@@ -188,6 +214,50 @@ class CompiledMonitor(FailureMonitor):
     """Monitor whose exposures the compiled kernels evaluate."""
 
     represents: ClassVar[bool] = True
+    only_largest: bool = False  # whether nothing but the largest exposures that count is asked for
+    half: Floats | None = None  # (points,): see :meth:`for_strains`
+
+    def for_largest(self) -> Self:
+        """Return a monitor that leaves out states which can't have a largest exposure."""
+        monitor = copy(self)
+        monitor.only_largest = True
+        if isinstance(monitor.circle, CompiledMonitor):
+            monitor.circle = monitor.circle.for_largest()
+        return monitor
+
+    def for_strains(self, half: Floats) -> Self:
+        """Return a monitor of strains alone, :meth:`largest_strain`.
+
+        `half` (points,) is the half thickness at the points, 0 where strains do not count.
+        """
+        monitor = copy(self)
+        monitor.half, monitor.has_interfaces = half, False
+        return monitor
+
+    def largest_strain(self, envelope: FailureEnvelope, fields: Floats) -> float:
+        """Return the largest absolute principal strain of both faces in fields, (n, numnp, 5)."""
+        face = self._kept(envelope).face
+        face[:] = 0.0
+        self._update_built_in(envelope, fields, [0.0] * len(fields))
+        return float(face[0])
+
+    def raise_largest(
+        self, envelope: FailureEnvelope, fields: Floats, times: Sequence[float]
+    ) -> None:
+        """Raise the exposures to the exposures of fields, (fields, numnp, 5), at their times."""
+        if len(self.criteria) > len(COMPILED):
+            super().raise_largest(envelope, fields, times)
+            return
+        self._update_built_in(envelope, fields, times)
+        circle, around = self.circle, self.around
+        if isinstance(circle, CompiledMonitor) and envelope.circle is not None and around:
+            strains = around.circle.strains_of_fields(fields)[..., 6 - circle.strains :]
+            circle._update_built_in(envelope.circle, strains.reshape(len(fields), -1), times)
+
+    @property
+    def strains(self) -> int:
+        """Number of strains at a point."""
+        return 6 if self.stresses.stretches else 3
 
     def update(
         self, envelope: FailureEnvelope, fields: Floats, times: Sequence[float]
@@ -199,11 +269,11 @@ class CompiledMonitor(FailureMonitor):
 
     def _evaluate(self, envelope: FailureEnvelope, displacement: Floats, time: float) -> None:
         """Raise the exposures, first with the kernel's criteria, then with the others."""
+        given = displacement[None]
         if not self.has_interfaces:  # the kernel can't compute the strains on the circle
             strains, _ = self.stresses.strains(displacement)
-            kept = self._kept(envelope).strain
-            kept[...] = strains[..., 6 - kept.shape[2] :]
-        self._update_built_in(envelope, displacement[None], [time])
+            given = strains[None, ..., 6 - self.strains :]
+        self._update_built_in(envelope, given, [time])
         if len(self.criteria) == len(COMPILED):
             return
         strains = self._kept(envelope).strain
@@ -215,7 +285,10 @@ class CompiledMonitor(FailureMonitor):
     def _update_built_in(
         self, envelope: FailureEnvelope, fields: Floats, times: Sequence[float]
     ) -> Evaluations:
-        """Raise the exposures of the kernel's criteria."""
+        """Raise the exposures of the kernel's criteria.
+
+        On a circle the fields are strains, as its points have no elements.
+        """
         u, field_times = np.ascontiguousarray(fields), np.array(times, dtype=np.float64)
         shape = len(u), len(envelope.largest.exposure)
         largest = Evaluations(np.empty(shape), np.empty(shape, np.int64), np.empty(shape, np.int8))
@@ -239,7 +312,7 @@ class CompiledMonitor(FailureMonitor):
 
     def _create_structures(self, envelope: FailureEnvelope) -> _Kept:
         elements, points, _ = self.stresses.shape
-        count = 6 if self.stresses.stretches else 3
+        count = self.strains
         families = midplanes(self.stresses)
         runs = [self._run(zone, run, count) for zone in self.zones for run in zone.runs]
         zones = [
@@ -247,7 +320,7 @@ class CompiledMonitor(FailureMonitor):
             for zone in self.zones
             if zone.interfaces and self.has_interfaces
         ]
-        strain = np.empty((elements, points, count))
+        strain, face = np.empty((elements, points, count)), np.zeros(1)
         structure = ExposuresStruct(
             elements=elements,
             points=elements * points,
@@ -268,12 +341,19 @@ class CompiledMonitor(FailureMonitor):
             largest=LargestStruct(**vars(envelope.largest)),
             strain=strain,
             gradient=np.empty((elements, 2, count)),
+            half=self.half if count == 6 else None,
+            face=face,
         )
-        return _Kept(self, structure, strain, [*families, *runs, *zones])
+        return _Kept(self, structure, strain, face, [*families, *runs, *zones])
 
     def _run(self, zone: ZoneCriteria, run: PlyRun, strains: int) -> PliesStruct:
         """Return the structure of a run of plies."""
-        stress = filled(zone.in_plane[6 - strains :, :, run.states])
+        per_strain, residual = zone.in_plane[6 - strains :, :, run.states], zone.residual
+        stress = filled(per_strain)
+        bound = None
+        share = _bounds(run.strengths)
+        if self.only_largest and _prunes(run.strengths):
+            bound = (share @ np.abs(per_strain)).max(axis=1)
         rows = None if isinstance(zone.points, slice) else zone.points
         return PliesStruct(
             points=self.counts.size if rows is None else len(rows),
@@ -286,6 +366,8 @@ class CompiledMonitor(FailureMonitor):
             ply=_ply(run.strengths),
             prunes=int(_prunes(run.strengths)),
             pucks=int(run.is_evaluated("puck")),
+            bound=bound,
+            rest=float((share @ np.abs(residual[:, run.states])).max()),
         )
 
     def _interfaces(self, zone: ZoneCriteria, strains: int) -> InterfacesStruct:

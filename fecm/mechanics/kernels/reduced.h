@@ -97,6 +97,19 @@ INLINE half NAME(free_tip)(const Sweep *x, const Reduction *r, int g) {
     return sum;
 }
 
+/* Store the coordinates at the times that lie in a step, from row `row` on.  Gives the next row. */
+APART TARGET int64_t NAME(store_coordinates)(const Reduced *p, const Reduction *r, const Cases *cases, int64_t step, int64_t row) {
+    const int64_t n = p->coordinates;
+    for (; row < p->rows && p->step[row] == step; row++)
+        for (int64_t k = 0; k < GROUPS * n; k++) {
+            const half q = r->q[k] - p->back[row] * r->d[k];
+            const Cases *c = cases + k % GROUPS;
+            for (int lane = 0; lane < WIDTH; lane++)
+                p->stored[(c->at[lane] * p->rows + row) * n + k / GROUPS] = q[lane];
+        }
+    return row;
+}
+
 /* Compute the impacts of eight cases. */
 TARGET void NAME(run_reduced)(const Sweep *x, const Reduced *p, const Reduction *r, int64_t first) {
     Cases cases[GROUPS];
@@ -112,9 +125,10 @@ TARGET void NAME(run_reduced)(const Sweep *x, const Reduced *p, const Reduction 
         *rigid = c->velocity / x->tip_shape[0];
         c->initial = 0.5 * c->scale * *rigid * *rigid;
     }
-    for (int64_t step = 0; step < x->steps; step++) {
+    for (int64_t step = 0, row = 0; step < x->steps; step++) {
         half w[GROUPS], base[GROUPS], applied[GROUPS];
         NAME(advance)(p, r, cases, w, damped);
+        row = NAME(store_coordinates)(p, r, cases, step, row);
         for (int g = 0; g < GROUPS; g++) base[g] = NAME(free_tip)(x, r, g);
         NAME(couple)(x, p->flexibility, cases, w, base);
         for (int g = 0; g < GROUPS; g++) {

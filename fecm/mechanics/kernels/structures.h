@@ -164,6 +164,10 @@ typedef struct {
     const double *keep, *share;           /* (n,): next increment per last one and per force */
     const double *rate;                   /* (n,): velocity per sum of the increments before and after */
     const double *factor, *transposed;    /* B over C, (rank + n - coupled, pairs), and its transpose */
+    int64_t rows;        /* times at which the coordinates are stored */
+    const int64_t *step; /* (rows,): first step that ends at or after each time, from 0, ascending */
+    const double *back;  /* (rows,): time from there to the end of the step, over the step */
+    double *stored;      /* (cases, rows, n): coordinates */
 } Reduced;
 
 /* Rows of `given`. */
@@ -210,6 +214,10 @@ typedef struct {
     Ply ply;
     int64_t prunes;         /* whether states that cannot rise are not evaluated, see failure.h */
     int64_t pucks;          /* whether Puck's criterion is evaluated */
+    /* NULL unless only the largest exposures matter: bound of all exposures per absolute strain, (strains,), and
+     * the bound without strain. */
+    const double *bound;
+    double rest;
 } Plies;
 
 /* Interfaces between the plies of elements.  `width` is `interfaces` padded to a multiple of four. */
@@ -267,4 +275,6 @@ typedef struct {
     Maxima plies, between;      /* (CRITERIA, points, states), (elements, interfaces) */
     Largest largest;
     double *strain, *gradient;  /* (points, strains), (elements, 2, strains): of the current displacement */
+    const double *half;         /* (points,): half thickness, 0 near the load; or NULL */
+    double *face;               /* (1,): largest absolute principal strain of both faces so far */
 } Exposures;
