@@ -297,18 +297,18 @@ function choose(kind, choice) {
 /** Sliders of a group: name, label, and the values at their ends. */
 function sliders() {
   const base = atRest, {spans} = data, list = [], {factor} = first.strike;
-  const part = factor > 1 ? ` of the deck's 1/${factor}` : "";
+  const part = factor > 1 ? ` (1/${factor})` : "";
   const spread = (value, [low, high], power = 1) => [value * low ** power, value * high ** power];
   const v = first.strike.velocity, of = {energy: spread(base.energy, spans.energy), velocity: spread(v, spans.energy, 0.5),
     height: data.gravity ? spread(v * v / (2 * data.gravity), spans.energy) : null};
-  list.push({group: "Impact", name: state.speed, label: {energy: "energy", velocity: "velocity", height: "drop height"}[state.speed], ends: of[state.speed]});
-  if (first.strike.scales) list.push({group: "Impact", name: "mass", label: `mass of the projectile${part}`, ends: spread(base.mass, spans.mass)});
-  list.push(state.law === "k" ? {group: "Contact", name: "k", label: `contact coefficient k${part}`, ends: spread(base.k, spans.k)}
-    : {group: "Contact", name: "radius", label: "radius of a steel tip", ends: spread((base.k / first.strike.unitK) ** 2, spans.k, 1)});
+  list.push({group: "Impact", name: state.speed, label: {energy: "energy", velocity: "velocity", height: "height"}[state.speed], ends: of[state.speed]});
+  if (first.strike.scales) list.push({group: "Impact", name: "mass", label: `mass${part}`, ends: spread(base.mass, spans.mass)});
+  list.push(state.law === "k" ? {group: "Contact", name: "k", label: `k${part}`, ends: spread(base.k, spans.k)}
+    : {group: "Contact", name: "radius", label: "radius", ends: spread((base.k / first.strike.unitK) ** 2, spans.k, 1)});
   if (base.giic !== null) {
-    list.push({group: "Laminate", name: "giic", label: "toughness G_IIc", ends: spread(base.giic, spans.giic)});
+    list.push({group: "Laminate", name: "giic", label: "G_IIc", ends: spread(base.giic, spans.giic)});
     for (const [name, label] of [["energy", "energy"], ["k", "k"], ["giic", "G_IIc"]])
-      list.push({group: "Scatter (standard deviation)", name, label, ends: [0, 40], scatter: true});
+      list.push({group: "Scatter (standard deviations)", name, label, ends: [0, 40], scatter: true});
   }
   return list;
 }
@@ -345,11 +345,11 @@ function build() {
 }
 
 /** Slider and field of a value.  The slider is logarithmic, except of a scatter in per cent. */
-function row({name, label, ends, scatter}) {
+function row({group, name, label, ends, scatter}) {
   const values = scatter ? state.scatter : state, id = scatter ? `scatter-${name}` : name, [low, high] = ends;
   const [power, unit] = scatter ? [0, "%"] : unitOf(name, values[name]);
-  const range = element("input", {type: "range", id, min: 0, max: scatter ? high : 400, step: 1, "aria-label": label});
-  const field = element("input", {type: "number", id: `${id}-value`, step: "any", min: 0});
+  const range = element("input", {type: "range", id, min: 0, max: scatter ? high : 400, step: 1, "aria-label": `${group}: ${label}`});
+  const field = element("input", {type: "number", id: `${id}-value`, step: "any", min: 0, "aria-label": `${group}: ${label} (${unit})`});
   const show = (skip) => {
     const value = values[name];
     if (skip !== range) range.value = scatter ? value : 400 * Math.log(value / low) / Math.log(high / low);
