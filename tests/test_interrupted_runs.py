@@ -330,7 +330,7 @@ NUMPY = ("--solver", "numpy")
 
 @pytest.mark.posix
 def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> None:
-    short = LONG.read_text().replace("LOOP       4000", "LOOP       2000")
+    short = LONG.read_text().replace("LOOP       4000", "LOOP       1000")
     (whole / "short.inp").write_text(short)
     (whole / "f.h5").write_text("precious")
     done = program(
@@ -343,7 +343,7 @@ def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> Non
         "0",
         *NUMPY,
         cwd=whole,
-        preexec_fn=lambda: small_files(1_000_000),
+        preexec_fn=lambda: small_files(500_000),
     )
     assert done.exit_code == 2
     assert "Traceback" not in done.stderr
