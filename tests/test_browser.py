@@ -227,6 +227,21 @@ def test_the_figures_of_the_first_sheet_stand_in_columns(
     assert len(set(lefts)) == columns
 
 
+@pytest.mark.parametrize(
+    ("scheme", "media", "is_dark"),
+    [("light", "screen", False), ("dark", "screen", True), ("dark", "print", False)],
+)
+def test_pictures_are_dark_on_a_dark_screen_and_light_on_paper(
+    pages: dict[str, Path], browser: Browser, scheme: str, media: str, is_dark: bool
+) -> None:
+    browser.open(pages["d7136"], scheme=scheme, media=media)
+    filters = browser.value(
+        '[...document.querySelectorAll("figure img")].map(one => getComputedStyle(one).filter)'
+    )
+    assert len(filters) >= 5
+    assert {text.startswith("invert(") for text in filters} == {is_dark}
+
+
 def test_a_run_takes_at_most_eight_sheets_and_its_answers_stand_on_the_first(
     pages: dict[str, Path], browser: Browser
 ) -> None:

@@ -90,6 +90,20 @@ def test_the_page_of_a_random_sweep_says_how_probable_delamination_is() -> None:
     assert text.startswith(f"{share:.4g} (")
 
 
+@pytest.mark.parametrize(("laws", "is_wide"), [(1, False), (2, True)])
+def test_the_scatter_of_one_law_leaves_room_beside_it_on_the_first_sheet(
+    laws: int, is_wide: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: dict[str, bool] = {}
+    monkeypatch.setattr(
+        "fecm.report.figures.drawn",
+        lambda kind, *_, wide=False, **__: iter(drawn.update({kind: wide}) or ()),
+    )
+    random = ["velocity=uniform:20,140", "k=uniform:1e6,2e6"][:laws]
+    page_of({"sweep": fecm.sweep(DELA, random=random, samples=16)})
+    assert drawn["scatter"] is is_wide
+
+
 def test_what_is_the_same_in_nearly_every_impact_has_no_row() -> None:
     page = page_of({"sweep": fecm.sweep(PLAIN, {"velocity": VELOCITIES[:2]})})
     results = next(section for section in page.sections if section.title == "Results")

@@ -13,7 +13,7 @@ from fecm._text import DECK_DIGITS
 from fecm.deck.units import quantity, short_name, unit_of
 from fecm.judge.limits import Judgement, TrustLevel
 from fecm.judge.validity import counted
-from fecm.plot.kinds import PictureKind
+from fecm.plot.kinds import PictureKind, Width
 from fecm.report import figures
 from fecm.report.content import (
     UNKNOWN,
@@ -313,7 +313,9 @@ def _pictures(name: str, sweep: SweepResult) -> Iterator[PageBlock]:
         )
         yield from figures.drawn(PictureKind.SENSITIVITY, named, f"{what}: sensitivity indices.")
         scattered = f"{what} over the random values."
-        yield from figures.drawn(PictureKind.SCATTER, named, scattered, wide=True, width="full")
+        several = len(sweep.random.design.laws) > 1
+        width: Width = "full" if several else "column"
+        yield from figures.drawn(PictureKind.SCATTER, named, scattered, wide=several, width=width)
         return
     yield from figures.drawn(PictureKind.MAP, named, f"{what} over the varied values.")
 
