@@ -145,10 +145,10 @@ def held_window(problem: Problem) -> tuple[Floats, float]:
 
 # The pull of a held window is the sum of the nodal reactions that pull.  Near a corner reactions
 # change sign within the thickness, so that the sum is known on a fine line of nodes only.  The line
-# of liftoff_static.csv has 100 points: p-elements with as many have its pulls to 0.006, and scatter
-# with the places of their lines (QI16 0.659 to 0.699, CP24 0.219 to 0.230).  On refinement they end
-# at 0.5535, 0.6842 and 0.2236 (+-0.0005; elements of order 7, graded meshes), and so does fecm:
-# 0.5532, 0.6837 and 0.2232 on 84 x 56.  The flexibilities of that file need no such care.
+# of liftoff_static.csv has 100 points: p-elements between the lines p_elements.WITNESS have all its
+# numbers.  With other lines and as many points the pull is 0.659 to 0.699 for QI16 and 0.219 to
+# 0.230 for CP24.  On refinement it ends at 0.5535, 0.6842 and 0.2236 (+-0.0005; elements of order
+# 7, graded meshes), and so does fecm: 0.5532, 0.6837 and 0.2232 on 84 x 56.
 
 
 @pytest.mark.parametrize(
@@ -178,14 +178,13 @@ def test_a_window_that_only_pushes_is_as_flexible_as_in_another_program(
 
 @pytest.mark.parametrize("layup", LAYUPS)
 @pytest.mark.few(1)
-def test_p_elements_with_as_many_points_have_the_pull_of_the_other_program(layup: str) -> None:
+def test_the_pull_of_the_other_program_is_that_of_its_mesh(layup: str) -> None:
     row = next(row for row in table("liftoff_static.csv") if row["layup"] == layup)
-    held = p_elements.held_window(layup, *p_elements.lines_of(6, 4, 1))
+    held = p_elements.held_window(layup, *p_elements.WITNESS)
     assert held.points == int(row["points_of_line"])
-    assert held.flexibility == pytest.approx(float(row["flexibility_mm_per_N"]), rel=1e-3)
-    assert held.pull == pytest.approx(float(row["pull_of_support_per_N"]), abs=0.006)
-    coarsest, *_ = (row for row in table("window_pull.csv") if row["layup"] == layup)
-    assert held.pull == pytest.approx(float(coarsest["pull"]), abs=1e-4)
+    assert held.flexibility == pytest.approx(float(row["flexibility_mm_per_N"]), rel=2e-6)
+    assert held.pull == pytest.approx(float(row["pull_of_support_per_N"]), abs=1e-4)
+    assert held.lowest == pytest.approx(float(row["largest_lift_mm_per_N"]), rel=2e-4)
 
 
 @pytest.mark.parametrize("layup", LAYUPS)
@@ -329,6 +328,16 @@ def test_an_impact_on_an_elastic_window_is_the_one_of_another_program(row: dict[
     assert np.abs(result["energy/balance_error"]).max() < 1e-6 * result.energy.attributes["initial"]
 
 
+@pytest.mark.long
+def test_the_default_stiffness_has_the_impact_of_a_stiff_line_of_another_program() -> None:
+    # The other program's line had 10^5 N/mm per mm; the default is 6.6 10^4 here.
+    result = run(with_segments(free_plate(FINE), pushing(FINE)))
+    assert result.history.force.max() == pytest.approx(13174.0, rel=5e-3)
+    assert result.history.plate_w.max() == pytest.approx(2.7673, rel=5e-3)
+    assert (result["supports/pull"] == 0.0).all()
+    assert np.abs(result["energy/balance_error"]).max() < 1e-6 * result.energy.attributes["initial"]
+
+
 def test_force_and_deflection_scale_with_the_velocity_on_supports_without_gaps() -> None:
     slow = free_plate((12, 8), duration=2e-4)
     law = slow.require(model.Indentation)
@@ -345,9 +354,8 @@ def test_force_and_deflection_scale_with_the_velocity_on_supports_without_gaps()
         text="",
     )
     first, second = (run(with_segments(deck, pushing((12, 8)))) for deck in (slow, fast))
-    assert np.abs(4.0 * first.history.force - second.history.force).max() < 1e-9 * np.max(
-        second.history.force
-    )
+    scale = second.history.force.max()
+    assert np.abs(4.0 * first.history.force - second.history.force).max() < 1e-12 * scale
 
 
 # Time step ---------------------------------------------------------------------------------------
@@ -386,6 +394,11 @@ def test_the_default_stiffness_takes_little_of_the_step() -> None:
 EDGES = table("elastic_edges.csv")
 
 
+def edge_words(row: dict[str, str]) -> str:
+    """The stiffnesses of a row."""
+    return f"{row['k_r_Nmm_per_rad_mm']}, {row['k_w_N_per_mm2']}"
+
+
 @pytest.mark.parametrize(
     ("mesh", "of_frequencies", "of_flexibility"),
     [
@@ -393,13 +406,31 @@ EDGES = table("elastic_edges.csv")
         pytest.param((48, 32), 5e-4, 1e-3, marks=pytest.mark.long),
     ],
 )
-@pytest.mark.parametrize(
-    "row", EDGES, ids=lambda row: f"{row['k_r_Nmm_per_rad_mm']}, {row['k_w_N_per_mm2']}"
-)
+@pytest.mark.parametrize("row", EDGES, ids=edge_words)
 @pytest.mark.few(2)
 def test_a_plate_on_elastic_edges_has_the_frequencies_of_another_program(
     row: dict[str, str], mesh: tuple[int, int], of_frequencies: float, of_flexibility: float
 ) -> None:
+    compare_on_elastic_edges(row, mesh, of_frequencies, of_flexibility)
+
+
+# Along an edge with k_r = 0 and a finite k_w both rotations are free, and shear has a layer as thin
+# as the plate, which 7 x 6 elements of order 5 leave out: with layers of elements along the edges
+# p-elements have f1 0.05 % and f2 0.04 % below the row.  fecm nears that: -0.03 % on 60 x 40.
+@pytest.mark.parametrize(
+    "row", [row for row in EDGES if edge_words(row) != "0, 10.0"], ids=edge_words
+)
+@pytest.mark.long
+def test_a_fine_plate_on_elastic_edges_has_the_frequencies_of_another_program(
+    row: dict[str, str],
+) -> None:
+    compare_on_elastic_edges(row, FINE, 2e-4, 3e-4)
+
+
+def compare_on_elastic_edges(
+    row: dict[str, str], mesh: tuple[int, int], of_frequencies: float, of_flexibility: float
+) -> None:
+    """Compare frequencies and flexibility with a row of the file."""
     k_r, k_w = float(row["k_r_Nmm_per_rad_mm"]), float(row["k_w_N_per_mm2"])
     deck = fecm.impact(
         fecm.Plate.rectangle((300.0, 200.0), mesh),
