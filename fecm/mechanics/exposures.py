@@ -83,6 +83,14 @@ class FailureEnvelope:
     # Exposures on the circle around the load; None without a load.
     circle: FailureEnvelope | None = None
 
+    def reset_to(self, start: FailureEnvelope) -> None:
+        """Copy the exposures of another envelope of the same monitor into these arrays."""
+        for part in ("plies", "interfaces", "largest"):
+            for name, values in vars(getattr(start, part)).items():
+                getattr(getattr(self, part), name)[...] = values
+        if self.circle is not None and start.circle is not None:
+            self.circle.reset_to(start.circle)
+
     def find_largest(self, counts: Bools, far: Bools, strains: Floats | None = None) -> None:
         """Find the largest exposures among the points and elements that count.
 

@@ -8,13 +8,13 @@ the midplane at the rows of RODP.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from fecm._typing import Floats, Indices
+from fecm._typing import Bools, Floats, Indices
 from fecm.authoring.time_values import lengthened, step_of
 from fecm.deck.macros import steps_at
 from fecm.deck.material_cards import Allowables, Cure
@@ -30,6 +30,7 @@ from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.mechanics.reduced_plate import ReducedFields, small_products
 from fecm.mechanics.stretching import principal_values
+from fecm.mechanics.symmetry import symmetry_reduction
 from fecm.problem.build import ImpactModel, build_model
 from fecm.problem.problem import Problem
 from fecm.results.metrics import BAND, EVALUATIONS, GAGE
@@ -157,8 +158,7 @@ class Recovery:
         self, rows: Rows, amplitudes: Floats, deck: Deck
     ) -> dict[str, tuple[float, float]]:
         """Return the largest and the last exposure of each criterion."""
-        monitor = self._monitor(deck)
-        envelope = monitor.start()
+        monitor, envelope = self._monitor(deck)
         self._raise(monitor, envelope, rows, amplitudes, rows.failure[:-1])
         before = monitor.largest(envelope).exposure[monitor.order]
         self._raise(monitor, envelope, rows, amplitudes, rows.failure[-1:])
@@ -187,20 +187,37 @@ class Recovery:
         """Monitor of FAIL for the largest exposures."""
         monitor = self.model.failure
         assert monitor is not None  # the program has FAIL
-        return monitor.for_largest() if isinstance(monitor, CompiledMonitor) else monitor
+        if not isinstance(monitor, CompiledMonitor):
+            return monitor
+        return monitor.for_largest(self._half_of_plate)
+
+    @cached_property
+    def _half_of_plate(self) -> Bools:
+        """Mask of the elements, (elements,), without those that are images under a half turn."""
+        plate = replace(self.problem.plate, nonlinear=False)
+        return np.asarray(symmetry_reduction(plate, self.problem.contact).weights > 0)
 
     def _half(self, rule: Quadrature) -> Floats:
         """Return half the thickness at the points of a rule, (points,), 0 near the load."""
         problem = self.problem
         x, y = problem.plate.strain_field(rule).places(problem.mesh.coordinates)
+        left_out = problem.under_load(x, y) | ~self._half_of_plate[:, None]
         half = np.broadcast_to(problem.plate.thicknesses / 2.0, x.shape)
-        return np.ascontiguousarray(np.where(problem.under_load(x, y), 0.0, half).ravel())
+        return np.ascontiguousarray(np.where(left_out, 0.0, half).ravel())
 
-    def _monitor(self, deck: Deck) -> FailureMonitor:
-        """Return FAIL's monitor with the strengths and the residual stresses of a deck."""
+    @cached_property
+    def _envelopes(self) -> tuple[FailureEnvelope, FailureEnvelope]:
+        """Envelope of FAIL's monitor that all cases use, and one without exposures."""
+        return self._failure.start(), self._failure.start()
+
+    def _monitor(self, deck: Deck) -> tuple[FailureMonitor, FailureEnvelope]:
+        """Return FAIL's monitor with strengths and residual stresses of a deck, and its start."""
         if all(deck.last(kind) == self.problem.deck.last(kind) for kind in (Allowables, Cure)):
-            return self._failure
-        return criteria_of_deck(self._failure, deck, self.problem.plate)
+            envelope, start = self._envelopes
+            envelope.reset_to(start)
+            return self._failure, envelope
+        monitor = criteria_of_deck(self._failure, deck, self.problem.plate)
+        return monitor, monitor.start()
 
     @cached_property
     def _strains(self) -> tuple[CompiledMonitor, FailureEnvelope] | None:

@@ -17,7 +17,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from fecm._typing import Floats
+from fecm._typing import Bools, Floats
 from fecm.mechanics.exposures import Evaluations, FailureEnvelope
 from fecm.mechanics.failure import MODES, Strengths, puck_limits, puck_slope
 from fecm.mechanics.failure_monitor import FailureMonitor, PlyRun, ZoneCriteria
@@ -217,10 +217,18 @@ class CompiledMonitor(FailureMonitor):
     only_largest: bool = False  # whether nothing but the largest exposures that count is asked for
     half: Floats | None = None  # (points,): see :meth:`for_strains`
 
-    def for_largest(self) -> Self:
-        """Return a monitor that leaves out states which can't have a largest exposure."""
+    def for_largest(self, chosen: Bools | None = None) -> Self:
+        """Return a monitor that leaves out states which can't have a largest exposure.
+
+        With `chosen` (elements,) it also leaves out the other elements.
+        """
         monitor = copy(self)
         monitor.only_largest = True
+        if chosen is not None:
+            monitor.counts, monitor.far = self.counts & chosen[:, None], self.far & chosen
+            if self.around is not None:
+                factor = np.where(chosen, self.around.factor, 0.0)
+                monitor.around = self.around._replace(factor=factor)
         if isinstance(monitor.circle, CompiledMonitor):
             monitor.circle = monitor.circle.for_largest()
         return monitor
@@ -253,6 +261,16 @@ class CompiledMonitor(FailureMonitor):
         if isinstance(circle, CompiledMonitor) and envelope.circle is not None and around:
             strains = around.circle.strains_of_fields(fields)[..., 6 - circle.strains :]
             circle._update_built_in(envelope.circle, strains.reshape(len(fields), -1), times)
+
+    @property
+    def _evaluated(self) -> Bools:
+        """Mask of the elements that are evaluated, (elements,)."""
+        elements, points, _ = self.stresses.shape
+        if self.half is not None:
+            return np.asarray((self.half.reshape(elements, points) > 0.0).any(axis=1))
+        if self.only_largest and len(self.criteria) == len(COMPILED):
+            return np.asarray(self.counts.any(axis=1) | self.far | (self._factors > 0.0))
+        return np.ones(elements, dtype=bool)
 
     @property
     def strains(self) -> int:
@@ -313,7 +331,7 @@ class CompiledMonitor(FailureMonitor):
     def _create_structures(self, envelope: FailureEnvelope) -> _Kept:
         elements, points, _ = self.stresses.shape
         count = self.strains
-        families = midplanes(self.stresses)
+        families = midplanes(self.stresses, self._evaluated)
         runs = [self._run(zone, run, count) for zone in self.zones for run in zone.runs]
         zones = [
             self._interfaces(zone, count)
@@ -355,6 +373,9 @@ class CompiledMonitor(FailureMonitor):
         if self.only_largest and _prunes(run.strengths):
             bound = (share @ np.abs(per_strain)).max(axis=1)
         rows = None if isinstance(zone.points, slice) else zone.points
+        if not self._evaluated.all():
+            of_zone = np.arange(self.counts.size)[zone.points]
+            rows = of_zone[self._evaluated[of_zone // self.counts.shape[1]]]
         return PliesStruct(
             points=self.counts.size if rows is None else len(rows),
             states=run.states.stop - run.states.start,
@@ -373,6 +394,9 @@ class CompiledMonitor(FailureMonitor):
     def _interfaces(self, zone: ZoneCriteria, strains: int) -> InterfacesStruct:
         """Return the structure of the interfaces of a zone."""
         rows = None if isinstance(zone.elements, slice) else zone.elements
+        if not self._evaluated.all():
+            of_zone = np.arange(len(self.counts))[zone.elements]
+            rows = of_zone[self._evaluated[of_zone]]
         shear = zone.shear / zone.weaker[:, None]  # (12, interfaces, plies, tau)
         shear = shear.reshape(2, 6, zone.interfaces, 4)[:, 6 - strains :].swapaxes(2, 3)
         table = filled(shear)

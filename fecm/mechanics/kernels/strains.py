@@ -21,7 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fecm._typing import Floats
+from fecm._typing import Bools, Floats
 from fecm.mechanics import strains as assumed_shear
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.interpolation import interpolate, local_shape_functions
@@ -77,9 +77,15 @@ class MidplaneStruct(Structure):
     )
 
 
-def midplanes(stresses: PlyStresses) -> list[MidplaneStruct]:
-    """Return the structures of the elements whose ply stresses are computed."""
-    return [_structure(stresses, family, complete) for family, complete in stresses.families]
+def midplanes(stresses: PlyStresses, chosen: Bools) -> list[MidplaneStruct]:
+    """Return the structures of those elements of ply stresses that are chosen, (elements,)."""
+    structures = []
+    for family, complete in stresses.families:
+        members = np.flatnonzero(chosen[family.rows])
+        if len(members):
+            part = family if len(members) == len(family.rows) else family.take(members)
+            structures.append(_structure(stresses, part, complete))
+    return structures
 
 
 def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> MidplaneStruct:
