@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from fecm.mechanics.reduced_plate import ReducedFields, reduced_plate
 from fecm.mechanics.solutions import static_response
 from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
+from fecm.sweeps import methods
 from tests.calls import call
 from tests.test_nonlinear_decks import NEWTON, STRUCK, forces, result, text
 from tests.test_nonlinear_sweeps import BLOW
@@ -149,3 +151,24 @@ def test_workers_change_no_byte(tmp_path: Path) -> None:
         done = call("sweep", "d.inp", *given, *model, "--workers", count, "-o", count, cwd=tmp_path)
         assert done.exit_code == 0, done.stderr
     assert (tmp_path / "1").read_bytes() == (tmp_path / "2").read_bytes()
+
+
+@pytest.mark.parametrize("until", [{"peak_force": 150.0}, {"exposure": 1.5}])
+@pytest.mark.few(1)  # of 2
+def test_a_velocity_that_the_model_finds_is_that_of_full_runs_and_confirmed_by_one(
+    until: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    full = fecm.sweep(DECK, until=until)
+    taken: list[int] = []
+    run_in_full = methods.run_in_full
+
+    def counted(*given: Any, **options: Any) -> Any:
+        taken.append(1)
+        return run_in_full(*given, **options)
+
+    monkeypatch.setattr(methods, "run_in_full", counted)
+    found = fecm.sweep(DECK, until=until, model="reduced", modes=ENOUGH)
+    np.testing.assert_allclose(found["found_velocity"], full["found_velocity"], rtol=2e-3)
+    assert len(taken) == 1
+    assert found.reduced is not None
+    assert 0.0 < abs(found.reduced.difference("peak_force")[0]) < 1e-3

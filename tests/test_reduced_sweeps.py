@@ -309,7 +309,6 @@ def test_a_stiff_contact_halves_the_time_step_of_its_cases() -> None:
 
 NOT_GIVEN: list[tuple[str, dict[str, Any], str]] = [
     (LINEAR, {}, "for decks with NONL"),
-    (DECK, {"until": 50.0, "vary": {"k": [5e4]}}, "searches take full runs"),
     (DECK, {"measure": lambda result: {"w": 0.0}}, "stores no result for a function"),
     (DECK, {"vary": {"dt": [4e-7]}}, "time step of its own"),
     (DECK, {"vary": None, "refine": [1, 2]}, "time step of its own"),

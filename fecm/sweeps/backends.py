@@ -130,7 +130,7 @@ class BendingModes:
     modes: int
     history: bool = True
     longer_than: BendingModes | None = None  # the same plate in the program of the deck
-    computes_together = True
+    computes_together = False  # a search would try velocities far beyond the model
 
     @property
     def lengthens(self) -> bool:

@@ -55,7 +55,6 @@ EXCLUSIONS = (
         ("build", FUNCTION),
         "the reduced model is of one deck, and stores no result for a function",
     ),
-    Exclusion("model", ("until",), "searches take full runs"),
     Exclusion("scheduler", ("executor", SEVERAL), "the cases are computed in one place"),
     Exclusion("executor", (SEVERAL,), "the cases are computed in one place"),
 )

@@ -50,7 +50,7 @@ from fecm.sweeps.limits import PEAK_FORCE, THRESHOLD
 from fecm.sweeps.outcome import About, Backend, Outcome, Status, merge
 from fecm.sweeps.price import expected, work_of_plates, work_of_runs
 from fecm.sweeps.random import cost_of_plates, cost_of_runs
-from fecm.sweeps.reduced import MOST_MODES, reduction_bytes, tasks_beside_full_runs
+from fecm.sweeps.reduced import MOST_MODES, reduction_bytes, tasks_beside_full_runs, tasks_of_search
 from fecm.sweeps.search import FIRST_VELOCITIES, Sought, search
 from fecm.sweeps.task import (
     MOST_TOGETHER,
@@ -195,6 +195,8 @@ class ReducedRuns(SharedPlate):
     def prepared(self, definition: Plan, run: RunTasks, watch: Watch) -> Prepared:
         """Compare the model with full runs; cases for which it does not hold are run in full."""
         modes = _modes(definition.settings)
+        if definition.settings.search is not None:
+            return tasks_of_search(definition, SEPARATE_RUNS, modes, run)
         return tasks_beside_full_runs(definition, SEPARATE_RUNS, modes, run, watch)
 
     def process_bytes(self, checked: Problem, settings: Settings, *, exact: bool) -> int:

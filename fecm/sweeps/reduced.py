@@ -397,6 +397,33 @@ def tasks_beside_full_runs(
     return Prepared([*tasks(definition, rest), *fulls], model)
 
 
+def tasks_of_search(definition: Plan, in_full: Method, modes: int, run: RunTasks) -> Prepared:
+    """Search the velocities of cases by the model, and confirm the highest energy by a full run.
+
+    Raises CasesError if the model does not hold there.
+    """
+    whole = tasks(definition)
+    done = run(whole)
+    outcome = merge([part for _, part in done], history=False)
+    energies = outcome.columns.get("found_energy", np.full(len(outcome.numbers), np.nan))
+    if np.isnan(energies).all():  # the cases have their reasons
+        return Prepared(whole, outcomes=done)
+    row = int(np.nanargmax(energies))
+    case = outcome.numbers[row]
+    velocity = float(outcome.columns["found_velocity"][row])
+    settings = replace(definition.settings, search=None)
+    values = {**definition.cases[case], "velocity": velocity}
+    count = len(definition.cases)
+    pair = [
+        Task(settings, method, count + place, (case,), (values,))
+        for place, method in enumerate((in_full, definition.method))
+    ]
+    confirmed = {task.number: part for task, part in run(pair)}
+    model = compared(modes, confirmed[count], confirmed[count + 1])
+    model.check()
+    return Prepared(whole, model, done)
+
+
 def count_held(ordered: Sequence[int], failing: Callable[[Iterable[int]], set[int]]) -> int:
     """Count the cases, ordered by energy, for which the model holds; the others are run in full.
 

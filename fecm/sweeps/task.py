@@ -122,6 +122,7 @@ class Prepared(NamedTuple):
 
     tasks: list[Task]
     model: ReducedModel | None = None
+    outcomes: Sequence[tuple[Task, Outcome]] = ()  # of all tasks, if they are known
 
 
 class Method(ABC):
