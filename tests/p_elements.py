@@ -1,4 +1,4 @@
-"""A plate on a held window with p-elements: NumPy and SciPy only, nothing of fecm.
+"""A plate on a window with p-elements: NumPy and SciPy only, nothing of fecm.
 
 Elements of the order p have w and both rotations at Gauss-Lobatto nodes, and p + 1 Gauss points
 each way.  The plate is the one of liftoff_static.csv.  ``python -m tests.p_elements`` prints
@@ -13,10 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from tests.builders import Floats
+
+Indices = NDArray[np.intp]
 
 SIZE, MARGIN = (150.0, 100.0), 12.5
 E1, E2, NU, G12, G13, G23, SHEAR = 161000.0, 11380.0, 0.32, 5170.0, 5170.0, 3980.0, 5.0 / 6.0
@@ -34,6 +37,14 @@ ORDER = 5
 WITNESS = (
     np.array([0.0, 12.5, 30.0, 50.0, 75.0, 100.0, 120.0, 137.5, 150.0]),
     np.array([0.0, 12.5, 30.0, 50.0, 70.0, 87.5, 100.0]),
+)
+
+
+# The node of that mesh nearest to (19, 6), the tip of a clamp, and lines of elements through it.
+TIP = (18.752643, 4.467303)
+THROUGH_TIP = (
+    np.array([0.0, 12.5, TIP[0], 30.0, 50.0, 75.0, 100.0, 120.0, 150.0 - TIP[0], 137.5, 150.0]),
+    np.array([0.0, TIP[1], 12.5, 30.0, 50.0, 70.0, 87.5, 100.0 - TIP[1], 100.0]),
 )
 
 
@@ -92,8 +103,69 @@ def lines_of(nx: int, ny: int, beyond: int) -> tuple[Floats, Floats]:
     return lines(SIZE[0], nx, beyond), lines(SIZE[1], ny, beyond)
 
 
-def held_window(layup: str, x_lines: Floats, y_lines: Floats, p: int = ORDER) -> HeldWindow:
+class Plate(NamedTuple):
+    """Stiffness and unit load of a free plate; three dofs a node, w first."""
+
+    K: sparse.csc_array
+    load: Floats
+    x: Floats  # of the nodes
+    y: Floats
+
+    def nearest(self, x: float, y: float) -> int:
+        """Return the node nearest to a place."""
+        return int(np.hypot(self.x - x, self.y - y).argmin())
+
+    @property
+    def window(self) -> Indices:
+        """Nodes of the window's line."""
+        inside = np.minimum(
+            np.minimum(self.x, SIZE[0] - self.x), np.minimum(self.y, SIZE[1] - self.y)
+        )
+        return np.flatnonzero(np.abs(inside - MARGIN) < 1e-9)
+
+    def solved(self, held: Indices) -> tuple[Floats, Floats]:
+        """Return displacements and residual forces with w held at nodes."""
+        free = np.setdiff1d(np.arange(len(self.load)), 3 * held)
+        u = np.zeros(len(self.load))
+        u[free] = splu(self.K[free][:, free]).solve(self.load[free])
+        return u, self.K @ u - self.load
+
+
+def held_window(layup: str, x_lines: Floats, y_lines: Floats) -> HeldWindow:
     """Solve the plate whose window holds w under a disc of 0.327 h in the middle."""
+    plate = free_plate(layup, x_lines, y_lines)
+    u, residual = plate.solved(plate.window)
+    reactions = residual[3 * plate.window]
+    pulling, total = float(reactions[reactions > 0.0].sum()), float(reactions.sum())
+    lowest = float(u[::3].min())
+    return HeldWindow(len(plate.window), float(plate.load @ u), pulling, total, lowest)
+
+
+def pushing_window(
+    layup: str, x_lines: Floats, y_lines: Floats, tip: tuple[float, float] | None
+) -> float:
+    """Return the flexibility on a rigid window that only pushes.
+
+    w is held at the node nearest to a place near a corner, and at its images in the other three.
+    """
+    plate = free_plate(layup, x_lines, y_lines)
+    tips = np.empty(0, dtype=int)
+    if tip is not None:
+        x, y = tip
+        places = [(a, b) for a in (x, SIZE[0] - x) for b in (y, SIZE[1] - y)]
+        tips = np.array([plate.nearest(*place) for place in places])
+    closed = np.ones(len(plate.window), dtype=bool)
+    for _ in range(50):
+        u, residual = plate.solved(np.concatenate([plate.window[closed], tips]))
+        w, reactions = u[3 * plate.window], residual[3 * plate.window]
+        before, closed = closed, np.where(closed, reactions <= 0.0, w > 0.0)
+        if np.array_equal(before, closed):
+            return float(plate.load @ u)
+    raise ArithmeticError("the points of contact do not settle")
+
+
+def free_plate(layup: str, x_lines: Floats, y_lines: Floats, p: int = ORDER) -> Plate:
+    """Return the plate between lines of elements, under a disc of 0.327 h in the middle."""
     D, A, h = rigidities(layup)
     points = lobatto(p)
     gauss, weights = legendre.leggauss(p + 1)
@@ -123,18 +195,8 @@ def held_window(layup: str, x_lines: Floats, y_lines: Floats, p: int = ORDER) ->
         ),
         shape=(count, count),
     )
-    from_edge = [
-        np.minimum(place, size - place) - MARGIN for place, size in zip(places, SIZE, strict=True)
-    ]
-    distance = np.minimum(from_edge[0][:, None], from_edge[1]).ravel()
-    held = 3 * np.flatnonzero(np.abs(distance) < 1e-9)
-    free = np.setdiff1d(np.arange(count), held)
-    u = np.zeros(count)
-    u[free] = splu(K[free][:, free]).solve(load[free])
-    reactions = (K @ u - load)[held]
-    pulling = float(reactions[reactions > 0.0].sum())
-    total, lowest = float(reactions.sum()), float(u[::3].min())
-    return HeldWindow(len(held), float(load @ u), pulling, total, lowest)
+    x, y = (place.ravel() for place in np.meshgrid(*places, indexing="ij"))
+    return Plate(K, load, x, y)
 
 
 def element_stiffness(
@@ -163,7 +225,7 @@ def pairs(line: Floats) -> list[tuple[float, float]]:
     return list(zip(line[:-1].tolist(), line[1:].tolist(), strict=True))
 
 
-def element_nodes(i: int, j: int, p: int, rows: int) -> np.ndarray:
+def element_nodes(i: int, j: int, p: int, rows: int) -> Indices:
     """Return the nodes of the element in column i and row j."""
     return np.add.outer((i * p + np.arange(p + 1)) * rows, j * p + np.arange(p + 1)).ravel()
 
