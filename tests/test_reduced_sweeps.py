@@ -228,6 +228,7 @@ def test_kernels_give_what_numpy_gives_and_a_case_the_same_bytes_with_any_others
     if coupled:
         model = replace(model, plate=replace(model.plate, damping=1000.0)).halved(3)
     model = replace(model, steps=2000 if coupled else 500)
+    model = replace(model, times=model.dt * np.array([0.4, 1.0, 77.3, 77.9, model.steps]))
     assert model.plate.flexibility > 0.0
     assert model.plate.coupled == (0 if coupled else model.plate.bending)
     rng = np.random.default_rng(3)
@@ -246,6 +247,11 @@ def test_kernels_give_what_numpy_gives_and_a_case_the_same_bytes_with_any_others
     assert wanted.force.max() > 10.0
     assert (np.abs(actual.force - wanted.force) <= 1e-10 * wanted.force.max()).all()
     np.testing.assert_array_equal(actual.unconverged_steps, wanted.unconverged_steps)
+    assert actual.coordinates is not None
+    assert wanted.coordinates is not None
+    size = np.abs(wanted.coordinates).max()
+    assert np.abs(actual.coordinates - wanted.coordinates).max() <= 1e-10 * size
+    assert np.abs(np.diff(wanted.coordinates[:, 1:4], axis=1)).max() > 1e-3 * size
     np.testing.assert_allclose(actual.error, wanted.error, rtol=0.0, atol=1e-10)
     for kind in ("indentation", "plate"):
         for name, values in getattr(wanted, kind)._asdict().items():

@@ -98,6 +98,8 @@ IN_PLANE = 1e-3
 # exactly; least energy of the states of membrane stress there, over the largest, and least size of
 # their forces.
 BENT, STATES, OMITTED = 2.0, 1e-5, 1e-2
+# States for which memory is reserved; plates have some 30.
+MOST_STATES = 40
 
 
 class ReductionError(FecmError, ArithmeticError):
@@ -373,6 +375,7 @@ def _omitted(
     """
     turn, tangent = held
     m, numnp = len(bending.stiffness), len(plate.mesh.coordinates)
+    require_memory(bytes_of_fields(plate, m), "the reduced model of the plate")
     # Force that bends the linear plate by some thicknesses, and the amplitudes under it.
     force = BENT * plate.thicknesses.max() / bending.compliance
     static = force * np.append(bending.deflection / bending.stiffness, 1.0)
@@ -386,12 +389,16 @@ def _omitted(
     # Loads of the size that they have in this deflection, of which few are independent.
     amount = np.abs(membrane @ (static[first] * static[second]))
     amount = np.maximum(amount, STATES**0.5 * amount.max(initial=0.0))
-    scales = np.append(np.outer(amount, np.abs(static[:m])), size)
-    loads = np.column_stack([forces.on(shapes[:m]), forces.of_pairs]) * scales
-    gram = np.linalg.eigh(loads.T @ loads)
-    chosen = np.flatnonzero(gram.eigenvalues > OMITTED**2 * gram.eigenvalues[-1:])[::-1]
-    basis = gram.eigenvectors[:, chosen]
-    few = loads @ basis
+    scales = np.append(np.outer(amount, np.abs(static[:m])), size[: forces.of_pairs.shape[1]])
+    triples = len(membrane) * m
+    on_w = forces.on(shapes[:m]) * scales[:triples]
+    of_pairs = forces.of_pairs * scales[triples:]
+    mixed = on_w.T @ of_pairs[2::NDOF]
+    gram = np.block([[on_w.T @ on_w, mixed], [mixed.T, of_pairs.T @ of_pairs]])
+    squares, vectors = np.linalg.eigh(gram)
+    basis = vectors[:, squares > OMITTED**2 * squares[-1:]][:, ::-1]
+    few = of_pairs @ basis[triples:]
+    few[2::NDOF] += on_w @ basis[:triples]
     across = shapes[:m].reshape(m, -1)
     independent = np.stack([turn.gather(load.reshape(numnp, NDOF)) for load in few.T], axis=1)
     solved = [turn.field(part).ravel() for part in tangent.solve(independent).T]
@@ -408,20 +415,18 @@ def _omitted(
     fields = (vectors[:, kept] / root).T @ fields
     amplitudes = root[:, None] * vectors[:, kept].T
     of_loads = amplitudes[:, 1:] @ basis.T / scales
-    cubic, of_pairs = np.split(of_loads, [len(membrane) * m], axis=1)
+    square = np.zeros((len(kept), len(size)))
+    square[:, : of_pairs.shape[1]] = of_loads[:, triples:]
     fields = fields.reshape(-1, numnp, NDOF)
-    stiffness = np.tensordot(
-        fields.reshape(len(fields), -1),
-        forces.on(fields).reshape(-1, len(membrane), len(fields)),
-        1,
-    )
+    on_fields = forces.on(fields).reshape(numnp, len(membrane), len(fields))
+    stiffness = np.tensordot(fields[:, :, 2], on_fields, 1)
     return {
         "membrane": membrane,
         "omitted": fields,
         "push": amplitudes[:, 0] / force,
         "project": amplitudes[:, 0] * force / work[0, 0] if work[0, 0] > 0.0 else 0.0 * root,
-        "cubic": np.ascontiguousarray(cubic),
-        "square": np.ascontiguousarray(of_pairs),
+        "cubic": np.ascontiguousarray(of_loads[:, :triples]),
+        "square": square,
         "stiffness": np.ascontiguousarray(stiffness.transpose(1, 0, 2)),
     }
 
@@ -445,8 +450,9 @@ class MembraneStates:
         displacement = -np.stack([in_plane.field(part)[:, :2] for part in solved.T], axis=2)
         fields = shapes.transpose(1, 2, 0)
         first, second = np.triu_indices(len(shapes))
-        # Forces of the pairs in a coupled laminate or a curved plate, (5 numnp, pairs).
-        self.of_pairs = np.zeros((NDOF * self._numnp, len(first)))
+        # Forces of the pairs in a coupled laminate or a curved plate, (5 numnp, pairs or 0).
+        couples = plate.is_curved or any(laminate.is_coupled for laminate in plate.laminates)
+        self.of_pairs = np.zeros((NDOF * self._numnp, len(first) * couples))
         self._blocks: list[tuple[ElementBlock, QuadraticStrains, Floats]] = []
         for family in plate.families:
             laminate = plate.laminate_of(family)
@@ -481,15 +487,15 @@ class MembraneStates:
         self.of_pairs.reshape(self._numnp, NDOF, -1)[:, :2] = 0.0
 
     def on(self, shapes: Floats) -> Floats:
-        """Return the forces of each state on each shape (shapes, numnp, 5), (5 numnp, ...)."""
-        forces = np.zeros((self._numnp, NDOF, self._count, len(shapes)))
+        """Return the forces on w of each state on each shape (shapes, numnp, 5), (numnp, ...)."""
+        forces = np.zeros((self._numnp, self._count, len(shapes)))
         for block, tied, stresses in self._blocks:
             slopes = _slopes(tied, block, shapes)
             nodes = block.nodes.T
             for state, N in enumerate(stresses):
                 for number, of_shape in enumerate(slopes):
-                    np.add.at(forces[:, 2, state, number], nodes, _on_w(tied, N, of_shape))
-        return forces.reshape(NDOF * self._numnp, -1)
+                    np.add.at(forces[:, state, number], nodes, _on_w(tied, N, of_shape))
+        return forces.reshape(self._numnp, -1)
 
 
 def _slopes(
@@ -755,6 +761,14 @@ def bytes_of_pairs(plate: PlateModel, neq: int, modes: int) -> int:
     count = modes * (modes + 1) // 2
     elements = min(BLOCK, max(len(family.rows) for family in plate.families))
     return 8 * count * (3 * neq + 4 * elements * 3 * len(plate.rules.bending.xi))
+
+
+def bytes_of_fields(plate: PlateModel, modes: int) -> int:
+    """Estimate the memory of the fields: forces of the states of membrane stress, and of pairs."""
+    couples = plate.is_curved or any(laminate.is_coupled for laminate in plate.laminates)
+    pairs = (modes + 1) * (modes + 2) // 2
+    numbers = 2 * MOST_STATES * modes + 2 * pairs + 2 * NDOF * pairs * couples
+    return 8 * len(plate.mesh.coordinates) * numbers
 
 
 def _integrated(plate: PlateModel, in_plane: SymmetryReduction, shapes: Floats) -> Pairs:

@@ -34,6 +34,7 @@ from fecm.mechanics.reduced_plate import (
     ReductionError,
     SeriesLaw,
     StoredTimes,
+    bytes_of_fields,
     bytes_of_pairs,
     motion_struct,
     reduced_plate,
@@ -541,5 +542,5 @@ def reduction_bytes(model: PlateModel, modes: int) -> int:
         ASSEMBLED * model.entries
         + factors
         + 8 * n * vectors
-        + bytes_of_pairs(model, in_plane, modes)
+        + max(bytes_of_pairs(model, in_plane, modes + 1), bytes_of_fields(model, modes))
     )
