@@ -478,10 +478,11 @@ class MembraneStates:
                 values = fields[block.nodes].reshape(ne, 1, nodes * NDOF, -1)
                 stresses = (weight * (AB @ (linear @ values))).transpose(3, 2, 1, 0)
                 slopes = _slopes(tied, block, shapes)
+                tied_forces = [tied.tied_forces(N) for N in stresses]
                 for pair, (i, j) in enumerate(zip(first.tolist(), second.tolist(), strict=True)):
-                    on_w = _on_w(tied, stresses[i], slopes[j])
+                    on_w = _on_w(tied, tied_forces[i], slopes[j])
                     if i != j:
-                        on_w = on_w + _on_w(tied, stresses[j], slopes[i])
+                        on_w = on_w + _on_w(tied, tied_forces[j], slopes[i])
                     np.add.at(self.of_pairs[:, pair], NDOF * block.nodes.T + 2, on_w)
         # In the plane the membrane is in equilibrium.
         self.of_pairs.reshape(self._numnp, NDOF, -1)[:, :2] = 0.0
@@ -493,8 +494,9 @@ class MembraneStates:
             slopes = _slopes(tied, block, shapes)
             nodes = block.nodes.T
             for state, N in enumerate(stresses):
+                n = tied.tied_forces(N)
                 for number, of_shape in enumerate(slopes):
-                    np.add.at(forces[:, state, number], nodes, _on_w(tied, N, of_shape))
+                    np.add.at(forces[:, state, number], nodes, _on_w(tied, n, of_shape))
         return forces.reshape(self._numnp, -1)
 
 
@@ -505,9 +507,11 @@ def _slopes(
     return [tied.slopes(w) for w in shapes[:, block.nodes, 2].swapaxes(1, 2)]
 
 
-def _on_w(tied: QuadraticStrains, N: Floats, slopes: tuple[Floats, Floats]) -> Floats:
-    """Return the forces on w, (nodes, ne), of a membrane force (3, points, ne) on slopes."""
-    n11, n22, n12 = tied.tied_forces(N)
+def _on_w(
+    tied: QuadraticStrains, n: tuple[Floats, Floats, Floats], slopes: tuple[Floats, Floats]
+) -> Floats:
+    """Return the forces on w, (nodes, ne), of the tied forces of a membrane force on slopes."""
+    n11, n22, n12 = n
     w_1, w_2 = slopes
     along_one = np.concatenate([w_1[:TYING] * n11, w_2[TYING:] * n12])
     along_two = np.concatenate([w_2[:TYING] * n22, w_1[TYING:] * n12])
