@@ -21,8 +21,7 @@ from fecm.results.schema import FILES, Form, dataset_of
 from fecm.results.sinks import MemorySink
 from tests.decks import LONG, small
 from tests.panels import TIME, scatter, struck
-from tests.test_nonlinear_decks import text
-from tests.test_nonlinear_sweeps import BLOW, PROGRAM
+from tests.test_reduced_strains import DECK as REDUCED
 
 ROOT = Path(__file__).resolve().parents[1]
 LAWS = {"velocity": "normal:100,5", "k": "lognormal:1.9e6,.15"}
@@ -51,7 +50,7 @@ SWEEPS: dict[str, Callable[[], fecm.SweepResult]] = {
     "find": lambda: fecm.sweep(LONG, {"k": [1e6]}, until={"peak_force": 60.0}),
     "refine": lambda: fecm.sweep(small(), refine=[1, 2]),
     "reduced": lambda: fecm.sweep(
-        text(PROGRAM, data=BLOW), {"velocity": [300.0]}, model="reduced", modes=4
+        REDUCED, {"velocity": [300.0]}, model="reduced", modes=4, measure=("failure", "gages")
     ),
 }
 FORMS: dict[str, tuple[Form, Callable[[], Saved]]] = {
