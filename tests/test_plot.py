@@ -363,12 +363,11 @@ def test_in_files_a_picture_of_one_result_has_the_title_of_its_deck_above_all_el
 ) -> None:
     figure = draw_entitled(kind, {"a": result}).figure
     figure.draw_without_rendering()
-    renderer = figure.canvas.get_renderer()
     (title,) = [text for text in figure.texts if text.get_text() == result.title]
     below = title.get_window_extent().y0
-    others = [*figure.legends, *figure.axes]
+    others = [part.get_tightbbox() for part in (*figure.legends, *figure.axes)]
     assert title.get_window_extent().y1 <= figure.bbox.y1
-    assert all(part.get_tightbbox(renderer).y1 <= below for part in others)
+    assert all(box is not None and box.y1 <= below for box in others)
     assert not draw_entitled("force", {"a": result, "b": result}).figure.texts
 
 

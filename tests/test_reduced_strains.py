@@ -17,6 +17,7 @@ from fecm.mechanics.solutions import static_response
 from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
 from fecm.sweeps import methods
+from fecm.sweeps.in_full import run_in_full
 from tests.calls import call
 from tests.test_nonlinear_decks import NEWTON, STRUCK, forces, result, text
 from tests.test_nonlinear_sweeps import BLOW
@@ -157,7 +158,6 @@ def test_a_velocity_that_the_model_finds_is_that_of_full_runs_and_confirmed_by_o
 ) -> None:
     full = fecm.sweep(DECK, until=until)
     taken: list[int] = []
-    run_in_full = methods.run_in_full
 
     def counted(*given: Any, **options: Any) -> Any:
         taken.append(1)
