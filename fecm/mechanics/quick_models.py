@@ -40,7 +40,7 @@ MOST_ITERATIONS = 30
 MOST_CHANGE = 2.0
 # Conjugate gradients end at this residual, relative to the load: the compliance has its square.
 # A tangent that needs more products is factorised anew.
-CLOSE_DIRECTION = 1.0e-5
+CLOSE_DIRECTION = 1.0e-6
 MOST_PRODUCTS = 15
 DIFFERENCE = 1.0e-4  # of two displacements whose forces give a product, relative to them
 MOST_STEPS = 200
