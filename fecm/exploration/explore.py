@@ -24,7 +24,7 @@ from fecm.judge import end
 from fecm.judge.limits import ENERGY_BALANCE, ITERATION, THRESHOLD
 from fecm.mechanics.impact_sweep import Given, ResultRow, SweepStruct
 from fecm.mechanics.kernels.webassembly import wasm_fields
-from fecm.problem.loading import AnyDeck, load_one
+from fecm.problem.loading import AnyDeck, load_deck, load_one
 from fecm.results.comparison import Measurement, measurement_of
 from fecm.results.metrics import METRICS
 from fecm.simulation.job import run_one
@@ -117,7 +117,8 @@ class Exploration:
     )
 
     def __post_init__(self) -> None:
-        problem = load_one(self.deck)
+        loaded = load_deck(self.deck)
+        problem = load_one(loaded)
         cases = table_of_cases(self.vary, None, system=system_of(problem.deck)).cases
         self._plan = plan(problem, cases, history=False)
         if words := problem.deck.nonlinear_words:
@@ -141,7 +142,7 @@ class Exploration:
                 f"{names[0]} does not change the plate: leave it out of `vary`; energy, velocity, "
                 "mass, k, radius and giic have sliders"
             )
-        self._problem = problem
+        self._file, self._problem = Path(loaded.source), problem
         self._measured: Measurement | None = None
         if self.overlay is not None:
             self._measured = measurement_of(
@@ -167,7 +168,10 @@ class Exploration:
         units = {name: unit_of(dimension, names) for name, dimension in DIMENSIONS.items()}
         data = {
             "title": deck.title or "(no title)",
-            "deck": {"name": _name_of(self.deck), "text": deck.to_text()},
+            "deck": {
+                "name": self._file.name if self._file.is_file() else "deck.inp",
+                "text": deck.to_text(),
+            },
             "units": {name: [unit, *PREFIXED.get(unit, ("", 0))] for name, unit in units.items()},
             "prefixes": {str(power): prefix for power, prefix in PREFIXES.items()},
             "labels": {name: quantity.description for name, quantity in METRICS.items()},
@@ -211,8 +215,8 @@ class Exploration:
     @property
     def inputs(self) -> list[Path]:
         """Files that the page is made of."""
-        given = (self.deck, self.overlay)
-        return [Path(file) for file in given if isinstance(file, str | Path) and _is_file(file)]
+        measured = [Path(self.overlay)] if isinstance(self.overlay, str | Path) else []
+        return [self._file, *measured]
 
     def __repr__(self) -> str:
         return f"<fecm page of {self._problem.deck.title!r}, {len(self._plan.cases)} plates>"
@@ -222,19 +226,6 @@ class Exploration:
             f'<iframe srcdoc="{html.escape(self.html)}" sandbox="allow-scripts allow-downloads" '
             f'style="width:100%;height:{HEIGHT}px;border:0"></iframe>'
         )
-
-
-def _name_of(deck: AnyDeck) -> str:
-    """Return the name of the file of a deck, or a name for a deck without a file."""
-    return Path(deck).name if isinstance(deck, str | Path) and _is_file(deck) else "deck.inp"
-
-
-def _is_file(path: str | Path) -> bool:
-    """Return whether a path, or the text of a deck, is the path of a file."""
-    try:
-        return Path(path).is_file()
-    except (OSError, ValueError):  # a text is too long, or has a zero byte
-        return False
 
 
 def check_page(path: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> None:

@@ -330,6 +330,13 @@ class FailureMonitor:
             rows.append(self.largest(envelope))
         return Evaluations.of(rows)
 
+    def for_largest(self, chosen: Bools | None = None) -> Self:
+        """Return a monitor for :meth:`raise_largest`; it may leave out all but some elements.
+
+        `chosen` (elements,) has at least one of the elements with each largest exposure.
+        """
+        return self
+
     def raise_largest(
         self, envelope: FailureEnvelope, fields: Floats, times: Sequence[float]
     ) -> None:

@@ -201,6 +201,10 @@ class _Path:
 
     def internal(self, u: Floats) -> Floats:
         """Return the internal forces f(u), (n,)."""
+        return self._of_plate(u)
+
+    def _of_plate(self, u: Floats) -> Floats:
+        """Return the internal forces without one-sided supports, (n,)."""
         forces, _ = self._membrane.forces(self._reduction.field(u))
         return np.asarray(self._stiffness @ u + self._reduction.gather(forces))
 
@@ -265,7 +269,7 @@ class _Path:
 
         def product(direction: Floats) -> Floats:
             change = DIFFERENCE * np.abs(u).max() / np.abs(direction).max()
-            forward, backward = (self.internal(u + c * direction) for c in (change, -change))
+            forward, backward = (self._of_plate(u + c * direction) for c in (change, -change))
             return np.asarray((forward - backward) / (2.0 * change))
 
         return product
@@ -301,12 +305,12 @@ class _LiftingPath(_Path):
 
     def internal(self, u: Floats) -> Floats:
         """Return the internal forces f(u), (n,)."""
-        return super().internal(u) + self._springs(self._open(u)) * u
+        return self._of_plate(u) + self._springs(self._open(u)) * u
 
     def equilibrium(self, u: Floats) -> Floats | None:
         """Return the equilibrium of the deflection of a displacement; None without convergence."""
         stiffness = _HeldStiffness(self._tangent)
-        forces = super().internal(u)
+        forces = self._of_plate(u)
         for _ in range(MOST_ITERATIONS):
             try:
                 change = self._change(u, forces, stiffness)
@@ -318,7 +322,7 @@ class _LiftingPath(_Path):
                 return u
             if not size < MOST_CHANGE:
                 return None
-            before, forces = forces, super().internal(u)
+            before, forces = forces, self._of_plate(u)
             stiffness.update(change, forces - before)
         return None
 
@@ -341,14 +345,8 @@ class _LiftingPath(_Path):
         return change + bound(stiffness.displacement(released))
 
     def _product(self, u: Floats) -> Callable[[Floats], Floats]:
-        springs, plate = self._springs(self._open(u)), super().internal
-
-        def product(direction: Floats) -> Floats:
-            change = DIFFERENCE * np.abs(u).max() / np.abs(direction).max()
-            forward, backward = (plate(u + c * direction) for c in (change, -change))
-            return np.asarray((forward - backward) / (2.0 * change) + springs * direction)
-
-        return product
+        springs, of_plate = self._springs(self._open(u)), super()._product(u)
+        return lambda direction: of_plate(direction) + springs * direction
 
     def _approximation(self, u: Floats) -> Callable[[Floats], Floats]:
         is_open = self._open(u)
@@ -384,15 +382,15 @@ class _HeldStiffness:
 
     def update(self, change: Floats, force: Floats) -> None:
         """Take the change of the plate's internal forces with the displacement into account."""
-        known = self._tangent.plate_forces(change)
+        expected = self._tangent.plate_forces(change)
         for vector, compliance in zip(self._vectors, self._compliances, strict=True):
-            known += float(vector @ change) / compliance * vector
-        work, known_work = float(change @ force), float(change @ known)
-        if not min(work, known_work) > 0.0:
+            expected += float(vector @ change) / compliance * vector
+        work, expected_work = float(change @ force), float(change @ expected)
+        if not min(work, expected_work) > 0.0:
             return
-        self._vectors += [known, force]
-        self._compliances += [-known_work, work]
-        self._displacements += [self._tangent.approximate(c) for c in (known, force)]
+        self._vectors += [expected, force]
+        self._compliances += [-expected_work, work]
+        self._displacements += [self._tangent.approximate(c) for c in (expected, force)]
         X = np.array(self._displacements)
         self._inner = np.diag(self._compliances) + np.array(self._vectors) @ X.T
         at_supports = X[:, self._tangent.supports.dofs]

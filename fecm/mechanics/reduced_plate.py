@@ -451,7 +451,7 @@ class MembraneStates:
         fields = shapes.transpose(1, 2, 0)
         first, second = np.triu_indices(len(shapes))
         # Forces of the pairs in a coupled laminate or a curved plate, (5 numnp, pairs or 0).
-        couples = plate.is_curved or any(laminate.is_coupled for laminate in plate.laminates)
+        couples = plate.is_curved or plate.is_coupled
         self.of_pairs = np.zeros((NDOF * self._numnp, len(first) * couples))
         self._blocks: list[tuple[ElementBlock, QuadraticStrains, Floats]] = []
         for family in plate.families:
@@ -769,7 +769,7 @@ def bytes_of_pairs(plate: PlateModel, neq: int, modes: int) -> int:
 
 def bytes_of_fields(plate: PlateModel, modes: int) -> int:
     """Estimate the memory of the fields: forces of the states of membrane stress, and of pairs."""
-    couples = plate.is_curved or any(laminate.is_coupled for laminate in plate.laminates)
+    couples = plate.is_curved or plate.is_coupled
     pairs = (modes + 1) * (modes + 2) // 2
     numbers = 2 * MOST_STATES * modes + 2 * pairs + 2 * NDOF * pairs * couples
     return 8 * len(plate.mesh.coordinates) * numbers

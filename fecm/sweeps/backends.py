@@ -37,7 +37,7 @@ from fecm.sweeps.in_full import (
     whole_force,
 )
 from fecm.sweeps.outcome import Outcome, merge, outcome_of
-from fecm.sweeps.recovered import NOTHING, Measured, Recovery, Rows
+from fecm.sweeps.recovered import NOTHING, Measured, NeededTimes, Recovery
 from fecm.sweeps.reduced import ReducedImpacts, by_halvings, impacts_on, reduced
 from fecm.sweeps.responses import (
     ComputedImpacts,
@@ -251,7 +251,7 @@ class ReducedResponse:
         return self.plate.steps
 
     @cached_property
-    def rows(self) -> Rows | None:
+    def rows(self) -> NeededTimes | None:
         """Times at which the coordinates of the plate are needed."""
         return None if self.recovery is None else self.recovery.rows(self.dt, self.steps)
 

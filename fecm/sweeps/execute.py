@@ -383,13 +383,13 @@ def carry_out_plan(
     def run_tried(tried: Sequence[Task]) -> list[tuple[Task, Outcome]]:
         return run(tried, lambda task, outcome: None)
 
-    whole, model, known = definition.method.prepared(definition, run_tried, watch)
+    whole, model, computed = definition.method.prepared(definition, run_tried, watch)
     if parts is not None:
         parts.tasks = whole
-    for task, outcome in known:
+    for task, outcome in computed:
         keep(task, outcome)
     try:
-        outcomes = [outcome for _, outcome in known or run(whole, keep)]
+        outcomes = [outcome for _, outcome in computed or run(whole, keep)]
     except SchedulerError as error:
         if not finished:
             raise

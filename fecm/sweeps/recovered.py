@@ -52,7 +52,7 @@ class Measured(NamedTuple):
 NOTHING = Measured({}, {}, {})
 
 
-class Rows(NamedTuple):
+class NeededTimes(NamedTuple):
     """Times at which the coordinates of a plate are needed, and where each use has its times."""
 
     times: Floats  # ascending
@@ -84,7 +84,7 @@ class Recovery:
         """Model of a full run."""
         return build_model(without_output(self.problem, self.measures))
 
-    def rows(self, dt: float, steps: int) -> Rows:
+    def rows(self, dt: float, steps: int) -> NeededTimes:
         """Return the times in `steps` steps of the reduced plate."""
         program, size = self.problem.program, step_of(self.problem)
         factor = dt * steps / (size * self.problem.work.steps)
@@ -100,10 +100,15 @@ class Recovery:
         times = np.unique(np.concatenate([*uses.values()]))
         places = {word: np.searchsorted(times, at) for word, at in uses.items()}
         none = np.empty(0, dtype=np.intp)
-        return Rows(times, places.get("FAIL", none), places["RODP"], places["GAGE"])
+        return NeededTimes(times, places.get("FAIL", none), places["RODP"], places["GAGE"])
 
     def measured(
-        self, rows: Rows, coordinates: Floats, force: Floats, dt: float, decks: Sequence[Deck]
+        self,
+        rows: NeededTimes,
+        coordinates: Floats,
+        force: Floats,
+        dt: float,
+        decks: Sequence[Deck],
     ) -> Measured:
         """Measure cases: coordinates (cases, rows, n), contact forces (steps, cases), decks."""
         times = np.append(0.0, np.add.accumulate(np.full(len(force), dt)))
@@ -139,7 +144,7 @@ class Recovery:
         low, high = (max(ends) for ends in zip(*bands, strict=True))
         return low, high
 
-    def of_case(self, rows: Rows, q: Floats, force: Floats, deck: Deck) -> CaseValues:
+    def of_case(self, rows: NeededTimes, q: Floats, force: Floats, deck: Deck) -> CaseValues:
         """Measure one case: coordinates (rows, n) and contact forces (rows,)."""
         amplitudes = self.fields.amplitudes(q, force)
         gages = self._gages(rows, amplitudes)
@@ -155,7 +160,7 @@ class Recovery:
         )
 
     def _exposures(
-        self, rows: Rows, amplitudes: Floats, deck: Deck
+        self, rows: NeededTimes, amplitudes: Floats, deck: Deck
     ) -> dict[str, tuple[float, float]]:
         """Return the largest and the last exposure of each criterion."""
         monitor, envelope = self._monitor(deck)
@@ -172,7 +177,7 @@ class Recovery:
         self,
         monitor: FailureMonitor,
         envelope: FailureEnvelope,
-        rows: Rows,
+        rows: NeededTimes,
         amplitudes: Floats,
         chosen: Indices,
     ) -> None:
@@ -187,8 +192,6 @@ class Recovery:
         """Monitor of FAIL for the largest exposures."""
         monitor = self.model.failure
         assert monitor is not None  # the program has FAIL
-        if not isinstance(monitor, CompiledMonitor):
-            return monitor
         return monitor.for_largest(self._half_of_plate)
 
     @cached_property
@@ -251,7 +254,7 @@ class Recovery:
         fields = self.fields.fields(np.eye(self.fields.count))
         return np.array([stretching.largest_linear(field) for field in fields])
 
-    def _bounds_of_strain(self, rows: Rows, amplitudes: Floats) -> Floats:
+    def _bounds_of_strain(self, rows: NeededTimes, amplitudes: Floats) -> Floats:
         """Return bounds of the largest strain of a face at the rows of RODP, (rows,)."""
         absolute = np.abs(amplitudes[rows.midplane])
         x, y = self._slopes
@@ -260,7 +263,7 @@ class Recovery:
         linear = np.einsum("ra,a", absolute, self._face_strains)
         return np.asarray(linear + slope**2 + self._preload_strain)
 
-    def _largest_strain(self, rows: Rows, amplitudes: Floats) -> float:
+    def _largest_strain(self, rows: NeededTimes, amplitudes: Floats) -> float:
         """Return the largest strain of a face at the rows of RODP."""
         if self.model.stretching is None or not len(rows.midplane):
             return 0.0
@@ -288,7 +291,7 @@ class Recovery:
         mean, radius = principal_values(np.moveaxis(strains, 0, -1))
         return strains, (np.abs(mean) + radius).max(axis=1)
 
-    def _largest_bending(self, rows: Rows, amplitudes: Floats) -> float:
+    def _largest_bending(self, rows: NeededTimes, amplitudes: Floats) -> float:
         """Return the largest strain of bending at the rows of RODP, or a bound below the limit."""
         if self.model.stretching is None or not len(rows.midplane):
             return 0.0
@@ -321,7 +324,7 @@ class Recovery:
         shapes = np.concatenate([self.fields.shapes, self.fields.omitted])
         return np.stack([stretching.slopes(shape) for shape in shapes], axis=1).T.copy()
 
-    def _largest_slope(self, rows: Rows, amplitudes: Floats) -> float:
+    def _largest_slope(self, rows: NeededTimes, amplitudes: Floats) -> float:
         """Return the largest slope at the rows of RODP, or a bound of it below the limit."""
         if self.model.stretching is None or not len(rows.midplane):
             return 0.0
@@ -342,7 +345,7 @@ class Recovery:
         fields = self.fields.fields(np.eye(count)).reshape(count, -1)
         return np.asarray((fields[:, gages.dof_indices] * gages.weights).sum(axis=2))
 
-    def _gages(self, rows: Rows, amplitudes: Floats) -> Floats:
+    def _gages(self, rows: NeededTimes, amplitudes: Floats) -> Floats:
         """Return the largest and the last absolute strain of each gage, (2, gages)."""
         gages = self.model.gages
         if gages is None or not len(rows.gages):

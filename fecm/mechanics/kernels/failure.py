@@ -229,7 +229,7 @@ class CompiledMonitor(FailureMonitor):
             if self.around is not None:
                 factor = np.where(chosen, self.around.factor, 0.0)
                 monitor.around = self.around._replace(factor=factor)
-        if isinstance(monitor.circle, CompiledMonitor):
+        if monitor.circle is not None:
             monitor.circle = monitor.circle.for_largest()
         return monitor
 
