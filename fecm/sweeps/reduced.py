@@ -64,8 +64,9 @@ if TYPE_CHECKING:
     from fecm.results.hdf5_reader import FileContents
 
 
-# Time step times the angular frequency of the fastest bending mode and of the contact on the plate,
-# and of the projectile on the contact.
+# Time step times the angular frequency of the fastest bending mode, of the contact on the plate, and
+# of the projectile on the contact.
+MODE_PHASE = 0.7
 PLATE_PHASE = 0.5
 PROJECTILE_PHASE = 0.2
 # A contact that is still stiffer is left to the balance of energy.
@@ -162,7 +163,7 @@ def reduced(checked: Problem, modes: int) -> ReducedImpacts:
 def impacts_on(plate: ReducedPlate, checked: Problem) -> ReducedImpacts:
     """Return impacts on a reduced plate, as long as those of a problem."""
     duration = step_of(checked) * checked.work.steps
-    steps = math.ceil(duration * plate.fastest / PLATE_PHASE)
+    steps = math.ceil(duration * plate.fastest / MODE_PHASE)
     return ReducedImpacts(plate, duration / steps, steps)
 
 
