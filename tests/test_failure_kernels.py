@@ -14,6 +14,7 @@ import fecm
 from fecm import Ply, Strengths
 from fecm._typing import Floats
 from fecm.mechanics import kernels
+from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.exposures import Evaluations, FailureEnvelope, PlyPoints
 from fecm.mechanics.failure import CRITERIA, OwnCriterion
@@ -22,7 +23,9 @@ from fecm.mechanics.kernels import failure as compiled_failure
 from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.laminate import laminate
 from fecm.mechanics.mesh import MeshArrays
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import PlyStresses
+from fecm.mechanics.symmetry import symmetry_reduction
 from fecm.problem.build import build_model
 from fecm.problem.loading import load_deck
 from fecm.results.sinks import MemorySink
@@ -342,6 +345,32 @@ def test_states_that_can_not_be_the_largest_are_left_out_without_a_change_of_a_b
         np.testing.assert_array_equal(getattr(few.largest, name), values, err_msg=name)
     left_out = few.plies.exposure < whole.plies.exposure
     assert left_out.any()
+
+
+@pytest.mark.parametrize("points", [2, 3])
+def test_half_of_a_plate_stands_for_the_whole_where_half_a_turn_repeats_the_fields(
+    points: int,
+) -> None:
+    mesh, stack = plate(regular=True), laminate(PLY, ANGLES[:5], [0.125] * 5)
+    rules = IntegrationRules(gauss(3), gauss(3), gauss(3), assumes_shear=True)
+    kept = symmetry_reduction(PlateModel(mesh, stack, rules, nonlinear=True), None)
+    draw = np.random.default_rng(5)
+    given = np.array([1e-3 * kept.field(draw.normal(size=kept.count)) for _ in range(4)])
+    stresses = PlyStresses(mesh, stack, gauss(points), nonlinear=True)
+    whole = CompiledMonitor(stresses, STRENGTHS)
+    half = whole.for_half(kept.represented_by)
+    envelopes = [history(monitor, given) for monitor in (half, whole)]
+    evaluated = envelopes[0].plies.exposure.reshape(len(half.criteria), 12, -1).any(axis=(0, 2))
+    assert evaluated.sum() == 6
+    half.complete(envelopes[0])
+    for part in ("plies", "interfaces"):
+        actual, wanted = (getattr(envelope, part) for envelope in envelopes)
+        np.testing.assert_allclose(actual.exposure, wanted.exposure, rtol=1e-10)
+        np.testing.assert_array_equal(actual.time, wanted.time)
+        np.testing.assert_array_equal(actual.mode, wanted.mode)
+    rows = [monitor.update(monitor.start(), given, times_of(given)) for monitor in (half, whole)]
+    np.testing.assert_allclose(rows[0].exposure, rows[1].exposure, rtol=1e-10)
+    np.testing.assert_array_equal(rows[0].state, rows[1].state)
 
 
 def test_the_largest_strain_of_the_faces_is_that_of_their_circles_of_mohr() -> None:

@@ -72,7 +72,7 @@ def assert_same_product(text: str, dofs: int, slips: frozenset[str]) -> None:
     NumPy's elements are moved to the origin: its Jacobians have the rounding of large coordinates.
     """
     motion = build_model(problem(text), RunOptions(solver="numpy", slips=slips)).motion
-    plate, kept = motion.plate, motion._reduction
+    plate, kept = motion.plate, motion.reduction
     u = np.random.default_rng(0).standard_normal(len(motion.mass))
     product = CompiledProduct(plate, kept, 1)
     plate.__dict__["families"] = [

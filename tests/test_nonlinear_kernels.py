@@ -15,9 +15,12 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm._typing import Bools
 from fecm.mechanics import kernels
+from fecm.mechanics.elements import gauss
 from fecm.mechanics.kernels import membrane
 from fecm.mechanics.kernels.plate import CompiledProduct
+from fecm.mechanics.kernels.stretching import CompiledStretching
 from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.plate import UNLOADED, PlateModel
 from fecm.mechanics.stiffness_product import (
@@ -27,6 +30,7 @@ from fecm.mechanics.stiffness_product import (
     stiffness_operator,
 )
 from fecm.mechanics.strains import FLAT, Curvature
+from fecm.mechanics.stretching import Stretching
 from fecm.mechanics.symmetry import SymmetryReduction, symmetry_reduction, unreduced
 from tests.builders import (
     Floats,
@@ -179,6 +183,39 @@ def test_a_membrane_with_another_rule_is_numpys() -> None:
         u = 0.1 * np.random.default_rng(0).standard_normal(kept.count)
         wanted = internal_force_operator(one, "numpy", kept)(u)
         np.testing.assert_allclose(product(u), wanted, rtol=0.0, atol=1e-14 * abs(wanted).max())
+
+
+@compiled
+@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize(
+    ("preload", "curvature"), [(UNLOADED, FLAT), ((-3.0, -2.0, 0.7), (0.7, -0.4, 0.3))]
+)
+@pytest.mark.few(4)  # of 12, 0.02 s each
+def test_energies_and_largest_values_of_the_midplane_are_numpys(
+    name: str, preload: tuple[float, float, float], curvature: Curvature
+) -> None:
+    plate = plate_of(MESHES[name](5, 4, 9), LAMINATES["coupled"], preload=preload)
+    rules = replace(RULES, bending=gauss(3))
+    numbers = np.arange(20) % 2
+    plate = replace(
+        plate,
+        curvature=curvature,
+        rules=rules,
+        others=(LAMINATES["isotropic"],),
+        laminate_numbers=numbers,
+    )
+    fields = np.random.default_rng(3).normal(size=(3, *plate.mesh.equations.shape))
+
+    def near(x: Floats, y: Floats) -> Bools:
+        return np.asarray(np.hypot(x - 0.4, y - 0.5) < 0.3)
+
+    wanted, actual = (
+        kind(plate, near, (0.4, 0.5)).evaluate(fields) for kind in (Stretching, CompiledStretching)
+    )
+    for quantity, values in wanted._asdict().items():
+        np.testing.assert_allclose(
+            getattr(actual, quantity), values, rtol=1e-12, atol=0.0, err_msg=quantity
+        )
 
 
 @compiled

@@ -141,7 +141,7 @@ def test_energies_and_largest_values_are_those_of_a_constant_field(
 ) -> None:
     plate = general(square(2, 3), preload=preload)
     A, B, D, S = (getattr(plate.laminate, name) for name in ("A", "B", "D", "shear"))
-    actual = Stretching(plate, load=(0.5, 0.3)).evaluate(inclined(plate))
+    actual = Stretching(plate, load=(0.5, 0.3)).evaluate(inclined(plate)[None])
     curvature, slope = np.array(CURVATURE), np.array(SLOPE)
     n = A @ STRETCHED + B @ curvature
     assert actual.energy == pytest.approx(0.5 * n @ np.linalg.solve(A, n), rel=1e-10)
@@ -170,9 +170,9 @@ def test_strains_under_the_load_do_not_count() -> None:
     x = plate.mesh.coordinates[:, 0]
     field = np.zeros((len(x), 5))
     field[:, 0] = 0.01 * x**2  # eps_xx = 0.02 x
-    right = Stretching(plate, lambda x, y: x > 0.5).evaluate(field)
+    right = Stretching(plate, lambda x, y: x > 0.5).evaluate(field[None])
     assert 0.02 * 0.4 < right.largest_strain < 0.02 * 0.5
-    assert Stretching(plate).evaluate(field).largest_strain > 0.02 * 0.9
+    assert Stretching(plate).evaluate(field[None]).largest_strain > 0.02 * 0.9
 
 
 @pytest.mark.parametrize("place", [(0.3, 0.4), (0.5, 0.5)])  # within an element, and on a node

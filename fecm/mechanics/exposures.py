@@ -65,6 +65,10 @@ class Largest:
         states = np.full(count, NOWHERE, dtype=np.int64)
         return cls(np.full(count, np.nan), states, np.zeros(count, np.int8), np.zeros((count, 6)))
 
+    def copy(self) -> Largest:
+        """Return a copy, which later evaluations do not change."""
+        return Largest(*(values.copy() for values in vars(self).values()))
+
 
 @dataclass
 class FailureEnvelope:

@@ -12,7 +12,7 @@ these :class:`Representatives`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy, deepcopy
+from copy import copy
 from itertools import groupby
 from typing import ClassVar, NamedTuple, Self
 
@@ -337,6 +337,16 @@ class FailureMonitor:
         """
         return self
 
+    def for_half(self, represented_by: Indices) -> Self:
+        """Return a monitor of fields that repeat under a half turn; it may evaluate half of them.
+
+        `represented_by` is that of a :class:`~fecm.mechanics.symmetry.SymmetryReduction`.
+        """
+        return self
+
+    def complete(self, envelope: FailureEnvelope) -> None:
+        """Add the exposures of the elements that a monitor of half the elements leaves out."""
+
     def raise_largest(
         self, envelope: FailureEnvelope, fields: Floats, times: Sequence[float]
     ) -> None:
@@ -349,7 +359,7 @@ class FailureMonitor:
         States on the circle are numbered after the states of the elements.  A ply on the circle
         has its number on the circle, an interface the number of the element next to the circle.
         """
-        largest = deepcopy(envelope.largest)
+        largest = envelope.largest.copy()
         on_circle = self._on_circle(envelope)
         if on_circle is None:
             return largest
@@ -363,7 +373,7 @@ class FailureMonitor:
         """Return the largest exposures on the circle, numbered as in :meth:`largest`, if any."""
         if envelope.circle is None or self.around is None:
             return None
-        on_circle = deepcopy(envelope.circle.largest)
+        on_circle = envelope.circle.largest.copy()
         of_interfaces = envelope.interfaces.exposure
         on_circle.state[:-1] += np.where(on_circle.state[:-1] == NOWHERE, 0, self._all_states)
         scaled = (

@@ -202,7 +202,7 @@ class PlateMotion:
         damping: float = 0.0,
     ) -> None:
         self.plate, self.damping, self.solver = plate, damping, resolved(solver)
-        self._reduction = reduction = (
+        self.reduction = reduction = (
             unreduced(plate) if reduced is None or solver == CSR else reduced
         )
         self.product = internal_force_operator(plate, solver, reduction, workers)
@@ -229,7 +229,7 @@ class PlateMotion:
     @property
     def moves_in_plane(self) -> bool:
         """Whether u or v may be nonzero somewhere."""
-        return bool(self._reduction.sign[:, :2].any() or self._prescribed[:, :2].any())
+        return bool(self.reduction.sign[:, :2].any() or self._prescribed[:, :2].any())
 
     def start(self) -> PlateState:
         """Return the state of the plate at rest."""
@@ -241,7 +241,7 @@ class PlateMotion:
 
         Raises ValueError if all dofs with a share are restrained.
         """
-        shares = self._reduction.gather(distribution)
+        shares = self.reduction.gather(distribution)
         (equations,) = np.nonzero(shares)
         if not len(equations):
             raise ValueError("the force acts on restrained dofs only")

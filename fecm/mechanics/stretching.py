@@ -12,41 +12,43 @@ membrane; it is 1/2 int eps A eps dA if B is zero.  The membrane force is N0 + n
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from fecm._typing import Bools, Floats
+from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics import strains as assumed_shear
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import interpolate, jacobian_determinants
+from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.membrane import QuadraticStrains
 from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import strains_of
 from fecm.mechanics.points import containing_elements
-from fecm.mechanics.strains import strain_of_deflection
+from fecm.mechanics.strains import StrainField, strain_of_deflection
 
 # Elements per block.
 BLOCK = 1024
 
 
 class MidplaneField(NamedTuple):
-    """Midplane of a plate in a displacement field.
+    """Midplane of a plate in displacement fields, (fields,) each.
 
     The largest values are taken over the points of quadrature.
     """
 
-    energy: float  # energy of the membrane, force*length
-    strain_energy: float  # strain energy of the plate, force*length
-    preload_energy: float  # 1/2 int N0_ij w,i w,j dA, force*length
-    largest_slope: float  # |grad w|
+    energy: Floats  # energy of the membrane, force*length
+    strain_energy: Floats  # strain energy of the plate, force*length
+    preload_energy: Floats  # 1/2 int N0_ij w,i w,j dA, force*length
+    largest_slope: Floats  # |grad w|
     # Absolute principal strain of both faces away from the load, including the preload's strain.
-    largest_strain: float
-    largest_force: float  # principal membrane force, tension positive, force/length
+    largest_strain: Floats
+    largest_force: Floats  # principal membrane force, tension positive, force/length
     # Absolute principal membrane force (force/length) and moment (force) at the load.
-    force_at_load: float
-    moment_at_load: float
+    force_at_load: Floats
+    moment_at_load: Floats
 
 
 class LargestOfMidplane(NamedTuple):
@@ -69,6 +71,7 @@ class _Elements:
     """Elements of a block at the points of a rule."""
 
     def __init__(self, plate: PlateModel, block: ElementBlock, rule: Quadrature) -> None:
+        self.block, self.rule = block, rule
         self.laminate = plate.laminate_of(block)
         self.compliance = np.linalg.inv(self.laminate.A)
         shapes = interpolate(block, rule)
@@ -121,38 +124,43 @@ class Stretching:
         load: tuple[float, float] | None = None,
     ) -> None:
         self.has_load = load is not None
+        self._plate, self._near = plate, near
         self._preload = np.array(plate.preload)
+        self._at_load = [] if load is None else _elements_at(plate, load)
+
+    @cached_property
+    def _parts(self) -> list[tuple[_Elements, Bools]]:
+        """Elements in blocks, and which of their points are near the load."""
+        plate = self._plate
         blocks = (block for family in plate.families for block in family.blocks(BLOCK))
         parts = [_Elements(plate, block, plate.rules.bending) for block in blocks]
-        self._parts = [(part, near(part.x, part.y)) for part in parts]
-        self._sheared = []
+        return [(part, self._near(part.x, part.y)) for part in parts]
+
+    @cached_property
+    def _sheared(self) -> list[tuple[StrainField, Indices, Floats, Floats]]:
+        """Points of the transverse shear by family: rows of the elements, areas and stiffness."""
+        plate, sheared = self._plate, []
         for family in plate.families:
             rule = assumed_shear.quadrature(family)
             area = jacobian_determinants(family, rule) * rule.weights
             shear = plate.laminate_of(family).shear
-            self._sheared.append((plate.strain_field(rule), family.rows, area, shear))
-        self._at_load = [] if load is None else _elements_at(plate, load)
+            sheared.append((plate.strain_field(rule), family.rows, area, shear))
+        return sheared
 
-    def evaluate(self, field: Floats) -> MidplaneField:
-        """Evaluate a displacement field, (numnp, 5)."""
+    def evaluate(self, fields: Floats) -> MidplaneField:
+        """Evaluate displacement fields, (fields, numnp, 5)."""
+        return MidplaneField(*np.array([self._values(field) for field in fields]).T)
+
+    def _values(self, field: Floats) -> tuple[float, ...]:
+        """Return the values of :class:`MidplaneField` of a displacement field."""
         energies, largest = np.zeros(3), np.full(3, -np.inf)
         for part, near in self._parts:
             midplane = part.midplane(field)
             energies += self._energies(part, midplane)
             largest = np.maximum(largest, self._largest(part, midplane, near))
         membrane, bending, preload = energies.tolist()
-        slope, strain, force = largest.tolist()
-        force_at_load, moment_at_load = self._under_load(field)
-        return MidplaneField(
-            energy=membrane,
-            strain_energy=membrane + bending + preload + self._shear_energy(field),
-            preload_energy=preload,
-            largest_slope=slope,
-            largest_strain=strain,
-            largest_force=force,
-            force_at_load=force_at_load,
-            moment_at_load=moment_at_load,
-        )
+        strain_energy = membrane + bending + preload + self._shear_energy(field)
+        return membrane, strain_energy, preload, *largest.tolist(), *self._under_load(field)
 
     def slopes(self, field: Floats) -> Floats:
         """Return the slopes of w at the points of a displacement field, (points, 2)."""
@@ -180,18 +188,19 @@ class Stretching:
     @property
     def preload_strain(self) -> float:
         """Largest principal strain of the preload."""
-        parts = (part.compliance @ self._preload * [1.0, 1.0, 0.5] for part, _ in self._parts)
-        return max(float(_largest_principal(strains)) for strains in parts)
+        return max(
+            float(largest_principal(np.linalg.inv(laminate.A) @ self._preload * [1.0, 1.0, 0.5]))
+            for laminate in map(self._plate.laminate_of, self._plate.families)
+        )
 
     def _energies(self, part: _Elements, midplane: _Midplane) -> Floats:
         """Return the energies of the membrane, of bending and of the preload."""
-        A, B, D = part.laminate.A, part.laminate.B, part.laminate.D
         n, kappa = part.forces(midplane), midplane.curvatures
         x, y = np.moveaxis(midplane.slopes, -1, 0)
         squares = np.stack([x * x, y * y, 2.0 * x * y], axis=-1)
         densities = [
             (n * (n @ part.compliance)).sum(axis=-1),
-            (kappa * (kappa @ (D - B @ np.linalg.solve(A, B)))).sum(axis=-1),
+            (kappa * (kappa @ bending_stiffness(part.laminate))).sum(axis=-1),
             squares @ self._preload,
         ]
         return np.array([0.5 * (part.area * density).sum() for density in densities])
@@ -223,16 +232,20 @@ class Stretching:
             return 0.0, 0.0
         force = np.mean([part.forces(midplane)[0, 0] for part, midplane in states], axis=0)
         moment = np.mean([part.moments(midplane)[0, 0] for part, midplane in states], axis=0)
-        return float(_largest_principal(self._preload + force)), float(_largest_principal(moment))
+        return float(largest_principal(self._preload + force)), float(largest_principal(moment))
+
+
+def bending_stiffness(laminate: LaminateSection) -> Floats:
+    """Return D - B A^-1 B, (3, 3)."""
+    A, B, D = laminate.A, laminate.B, laminate.D
+    return np.asarray(D - B @ np.linalg.solve(A, B))
 
 
 def _largest_face(part: _Elements, strains: Floats, curvatures: Floats, near: Bools) -> float:
     """Return the largest absolute principal strain of both faces at points that are not near."""
     bent = 0.5 * part.laminate.thickness * curvatures
     # gamma_xy is twice the tensor component.
-    faces = [
-        _largest_principal(face * [1.0, 1.0, 0.5]) for face in (strains - bent, strains + bent)
-    ]
+    faces = [largest_principal(face * [1.0, 1.0, 0.5]) for face in (strains - bent, strains + bent)]
     return float(np.where(near, 0.0, np.maximum(*faces)).max())
 
 
@@ -242,7 +255,7 @@ def principal_values(tensor: Floats) -> tuple[Floats, Floats]:
     return 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
 
 
-def _largest_principal(tensor: Floats) -> Floats:
+def largest_principal(tensor: Floats) -> Floats:
     """Return the largest absolute principal value of xx, yy, xy (..., 3)."""
     mean, radius = principal_values(tensor)
     return np.asarray(np.abs(mean) + radius)

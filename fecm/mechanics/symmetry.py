@@ -47,6 +47,9 @@ class SymmetryReduction:
     # (numel,): number of elements that each element represents: 1 for itself, 2 with its image, or
     # 0.
     weights: NDArray[np.int_]
+    # (numel,): element that each element has the displacements of, turned by half a turn if it is
+    # not the element itself.
+    represented_by: Indices
 
     @property
     def is_half(self) -> bool:
@@ -98,8 +101,9 @@ def unreduced(plate: PlateModel) -> SymmetryReduction:
     equations = plate.mesh.equations
     index = equations.astype(np.intp) - 1
     index[index < 0] = plate.neq
-    weights = np.ones(len(plate.mesh.elements), dtype=int)
-    return SymmetryReduction(plate.neq, index, (equations > 0).astype(float), weights)
+    elements = np.arange(len(plate.mesh.elements))
+    sign = (equations > 0).astype(float)
+    return SymmetryReduction(plate.neq, index, sign, np.ones_like(elements), elements)
 
 
 def symmetry_reduction(plate: PlateModel, contact: Floats | None) -> SymmetryReduction:
@@ -127,7 +131,8 @@ def _reduction(plate: PlateModel, nodes: Indices, elements: Indices) -> Symmetry
     count = int(np.count_nonzero(leads))
     numbers = np.full(sign.size, count, dtype=np.intp)
     numbers[leads.ravel()] = np.arange(count)
-    return SymmetryReduction(count, np.where(sign != 0.0, numbers[leaders], count), sign, weights)
+    index = np.where(sign != 0.0, numbers[leaders], count)
+    return SymmetryReduction(count, index, sign, weights, np.minimum(elements, element_rows))
 
 
 def half_turn_images(coordinates: Floats) -> Indices | None:

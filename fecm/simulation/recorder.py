@@ -311,6 +311,7 @@ def exposures_of(
 
     Exposures of plies are (states,).
     """
+    monitor.complete(envelope)
     arrays, plies = {}, monitor.every_state(envelope)
     for part in ("exposure", "time", "mode"):
         for name, values in zip(monitor.criteria, getattr(plies, part), strict=True):
@@ -514,8 +515,8 @@ class Recorder:
     def stretching(self, steps: Steps, times: Times, fields: Floats) -> None:
         """Store rows about the midplane of a nonlinear plate, from displacements at `times`."""
         if self._model.stretching is not None:
-            for step, time, field in zip(steps, times, fields, strict=True):
-                self.row(MEMBRANE, step, time, self._model.stretching.evaluate(field)._asdict())
+            values = self._model.stretching.evaluate(fields)
+            self.rows(MEMBRANE, steps, times, values._asdict())
 
     def _parts(self) -> dict[str, StepRecorder | RowBuffer]:
         """Return the recorders with rows that are not stored yet, by their path in a checkpoint."""

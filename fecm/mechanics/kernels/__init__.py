@@ -8,7 +8,9 @@ Each kernel has one Python file, which defines its structures, its input and its
 - many impacts on one plate: :mod:`fecm.mechanics.impact_sweep`;
 - strains: :mod:`~fecm.mechanics.kernels.strains`;
 - exposures of plies: :mod:`~fecm.mechanics.kernels.failure`, from the strains of
-  :mod:`~fecm.mechanics.kernels.strains`.
+  :mod:`~fecm.mechanics.kernels.strains`;
+- energies and largest values of the midplane of a nonlinear plate:
+  :mod:`~fecm.mechanics.kernels.stretching`.
 
 This file finds and loads the library.
 """
@@ -55,6 +57,10 @@ FUNCTIONS = {
     "fecm_reduced": (c_int, [c_void_p, c_void_p]),
     "fecm_strains": (None, [c_void_p, c_int64, c_int64, c_int64, Doubles, Doubles]),
     "fecm_failure": (None, [c_void_p, c_int64, c_int64, Doubles, Doubles, Doubles, Longs, Codes]),
+    "fecm_stretching": (
+        None,
+        [c_void_p, c_int64, c_void_p, c_int64, c_int64, c_int64, Doubles, Doubles, Doubles],
+    ),
 }
 
 # Library that the build puts beside this file.  It does not depend on Python.

@@ -17,7 +17,8 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from fecm._typing import Bools, Floats
+from fecm._typing import Bools, Floats, Indices
+from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.exposures import Evaluations, FailureEnvelope
 from fecm.mechanics.failure import MODES, Strengths, puck_limits, puck_slope
 from fecm.mechanics.failure_monitor import FailureMonitor, PlyRun, ZoneCriteria
@@ -199,6 +200,12 @@ def _prunes(p: Strengths) -> bool:
     return ratio <= LARGEST_RATIO and abs(p.f12) <= LARGEST_F12
 
 
+def _opposite(rule: Quadrature) -> Indices:
+    """Return the point opposite to each point of a rule, (points,)."""
+    distance = np.hypot(rule.xi + rule.xi[:, None], rule.eta + rule.eta[:, None])
+    return np.asarray(distance.argmin(axis=1))
+
+
 @dataclass
 class _Kept:
     """Arrays and structures with which the kernels raise an envelope."""
@@ -216,6 +223,7 @@ class CompiledMonitor(FailureMonitor):
     represents: ClassVar[bool] = True
     only_largest: bool = False  # whether nothing but the largest exposures that count is asked for
     half: Floats | None = None  # (points,): see :meth:`for_strains`
+    represented_by: Indices | None = None  # (elements,): see :meth:`for_half`
 
     def for_largest(self, chosen: Bools | None = None) -> Self:
         """Return a monitor that leaves out states which can't have a largest exposure.
@@ -232,6 +240,27 @@ class CompiledMonitor(FailureMonitor):
         if monitor.circle is not None:
             monitor.circle = monitor.circle.for_largest()
         return monitor
+
+    def for_half(self, represented_by: Indices) -> Self:
+        """Return a monitor that leaves out elements which others represent."""
+        if len(self.criteria) > len(COMPILED):
+            return self
+        monitor = copy(self)
+        monitor.represented_by = represented_by
+        return monitor
+
+    def complete(self, envelope: FailureEnvelope) -> None:
+        """Copy the exposures of elements to the elements that they represent."""
+        if self.represented_by is None:
+            return
+        elements, points, _ = self.stresses.shape
+        images = np.flatnonzero(self.represented_by != np.arange(elements))
+        sources, opposite = self.represented_by[images], _opposite(self.stresses.rule)
+        for values in vars(envelope.interfaces).values():
+            values[images] = values[sources]
+        for values in vars(envelope.plies).values():
+            by_point = values.reshape(len(self.criteria), elements, points, -1)
+            by_point[:, images] = by_point[:, sources][:, :, opposite]
 
     def for_strains(self, half: Floats) -> Self:
         """Return a monitor of strains alone, :meth:`largest_strain`.
@@ -266,6 +295,8 @@ class CompiledMonitor(FailureMonitor):
     def _evaluated(self) -> Bools:
         """Mask of the elements that are evaluated, (elements,)."""
         elements, points, _ = self.stresses.shape
+        if self.represented_by is not None and not self.only_largest:
+            return np.asarray(self.represented_by == np.arange(elements))
         if self.half is not None:
             return np.asarray((self.half.reshape(elements, points) > 0.0).any(axis=1))
         if self.only_largest and len(self.criteria) == len(COMPILED):

@@ -11,6 +11,7 @@
  *   reduced.h     the same on a nonlinear plate in a few modes; twice
  *   midplane.h    strains of the midplane and curvatures for the exposures; twice
  *   failure.h     exposures of plies, four states of stress at a time; twice
+ *   stretching.h  energies and largest values of the midplane of a nonlinear plate; twice
  *
  ** This file has the steps, their threads, and the functions that Python calls.
  *
@@ -186,6 +187,9 @@ static const int BEGIN[CRITERIA + 1] = {0, 5, 6, 10, 15};
 /* Exposures below this share of the stored ones are not evaluated; the margin is far above rounding. */
 #define KEEP (1.0 - 1e-9)
 
+/* Values of the midplane of a nonlinear plate: twice the energies, then the largest values. */
+enum { MEMBRANE, BENDING, OF_PRELOAD, SHEARING, SLOPE, FACE, MEMBRANE_FORCE, STRETCHED };
+
 #define TARGET static
 #include "impact.h"
 #undef TARGET
@@ -215,6 +219,7 @@ __attribute__((constructor)) static void ask_processor(void) {
 #include "reduced.h"
 #include "midplane.h"
 #include "failure.h"
+#include "stretching.h"
 #undef ROOT
 #undef ANY
 #undef LARGER
@@ -242,6 +247,7 @@ __attribute__((constructor)) static void ask_processor(void) {
 #include "reduced.h"
 #include "midplane.h"
 #include "failure.h"
+#include "stretching.h"
 #ifdef HAS_AVX2_CODE
 #pragma GCC pop_options
 #endif
@@ -568,6 +574,15 @@ EXPORT void fecm_failure(const Exposures *m, int64_t rows, int64_t numbers, cons
         memcpy(exposure + m->criteria * row, m->largest.exposure, sizeof *exposure * m->criteria);
         memcpy(state + m->criteria * row, m->largest.state, sizeof *state * m->criteria);
         memcpy(mode + m->criteria * row, m->largest.mode, sizeof *mode * m->criteria);
+    }
+}
+
+/* Values of the midplane of a nonlinear plate in displacement fields, (fields, STRETCHED) of fields (fields, numbers),
+ * and midplane strains and curvatures at the load, (fields, elements at the load, 6). */
+EXPORT void fecm_stretching(const Stretched *families, int64_t count, const Midplane *at_load, int64_t loaded, int64_t fields, int64_t numbers, const double *u, double *found, double *strain) {
+    for (int64_t field = 0; field < fields; field++, u += numbers) {
+        CHOSEN(midplanes)(families, count, u, found + STRETCHED * field);
+        CHOSEN(midplanes_at)(at_load, loaded, u, strain + 6 * loaded * field);
     }
 }
 

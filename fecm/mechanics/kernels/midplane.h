@@ -46,22 +46,22 @@ INLINE void NAME(gradients)(const Midplane *g, const int64_t *node, const double
     out[6] += x * w[2], out[7] += y * w[1], out[8] += w[2] * y + x * w[1];
 }
 
-/* Derivatives by x and y at four points of u, v, theta_x, theta_y, starting with dof `first`. */
-INLINE void NAME(derivatives)(const Midplane *g, const int64_t *node, int64_t shape, int64_t point, int first, const double *u, half *x, half *y) {
-    static const int dofs[4] = {0, 1, 3, 4};
-    half xi[4] = {{0}}, eta[4] = {{0}};
+/* Derivatives by x and y at four points of the dofs from `first` to `end` of u, v, theta_x, theta_y, w. */
+INLINE void NAME(derivatives)(const Midplane *g, const int64_t *node, int64_t shape, int64_t point, int first, int end, const double *u, half *x, half *y) {
+    static const int dofs[5] = {0, 1, 3, 4, 2};
+    half xi[5] = {{0}}, eta[5] = {{0}};
     const double *t = g->table + point;
     for (int64_t i = 0; i < g->nodes; i++, t += 3 * g->width) {
         const double *q = u + 5 * node[i];
         const half by_xi = NAME(load)(t), by_eta = NAME(load)(t + g->width);
-#pragma GCC unroll 4
-        for (int k = first; k < 4; k++) xi[k] += q[dofs[k]] * by_xi, eta[k] += q[dofs[k]] * by_eta;
+#pragma GCC unroll 5
+        for (int k = first; k < end; k++) xi[k] += q[dofs[k]] * by_xi, eta[k] += q[dofs[k]] * by_eta;
     }
     const double *m = g->metric + 4 * g->width * shape + point;
     const half xx = NAME(load)(m), xe = NAME(load)(m + g->width);
     const half yx = NAME(load)(m + 2 * g->width), ye = NAME(load)(m + 3 * g->width);
-#pragma GCC unroll 4
-    for (int k = first; k < 4; k++) x[k] = xx * xi[k] + xe * eta[k], y[k] = yx * xi[k] + ye * eta[k];
+#pragma GCC unroll 5
+    for (int k = first; k < end; k++) x[k] = xx * xi[k] + xe * eta[k], y[k] = yx * xi[k] + ye * eta[k];
 }
 
 /* Midplane strains of four points. */
@@ -93,7 +93,7 @@ INLINE void NAME(midplane)(const Midplane *g, const double *u, int strains, doub
         if (strains == 6 && g->tying) NAME(tied_components)(g, node, g->tying_metric + 4 * TYING * shape, u, tied);
         for (int64_t point = 0; point < g->width; point += 4) {
             half x[4], y[4], found[6];
-            NAME(derivatives)(g, node, shape, point, strains == 6 ? 0 : 2, u, x, y);
+            NAME(derivatives)(g, node, shape, point, strains == 6 ? 0 : 2, 4, u, x, y);
             if (strains == 6) NAME(stretching)(g, node, shape, point, u, tied, x, y, found);
             /* Curvatures are the strains of the negative rotations. */
             found[3] = 0.0 - x[2], found[4] = 0.0 - y[3], found[5] = 0.0 - y[2] - x[3];

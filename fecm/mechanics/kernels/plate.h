@@ -594,6 +594,17 @@ INLINE void NAME(strains_at_tying)(const Strains *g, int64_t e, const double *u,
     }
 }
 
+/* Assumed shear strains at four points of an element. */
+INLINE void NAME(assumed_strains)(const Strains *g, int64_t e, int64_t point, const double *tied, half *xz, half *yz) {
+    half of_xi = {0}, of_eta = {0};
+    const int64_t width = g->width, each = g->tying / 2;
+    const double *one = g->tied + point, *other = one + each * width, *m = g->metric + 4 * width * g->shape[e] + point;
+    for (int64_t i = 0; i < each; i++, one += width, other += width)
+        of_xi += tied[i] * NAME(load)(one), of_eta += tied[each + i] * NAME(load)(other);
+    *xz = NAME(load)(m) * of_xi + NAME(load)(m + width) * of_eta;
+    *yz = NAME(load)(m + 2 * width) * of_xi + NAME(load)(m + 3 * width) * of_eta;
+}
+
 /* Curvatures x, y, xy and shear strains yz, xz, as StrainField evaluates them, four points at a time. */
 TARGET void NAME(strains)(const Strains *g, int64_t fields, int64_t numnp, int64_t numel, const double *u, double *strains) {
     const int64_t width = g->width, points = g->points, component = fields * numel * points;
@@ -617,14 +628,7 @@ TARGET void NAME(strains)(const Strains *g, int64_t fields, int64_t numnp, int64
                 const half xx = NAME(load)(m), xe = NAME(load)(m + width);
                 const half yx = NAME(load)(m + 2 * width), ye = NAME(load)(m + 3 * width);
                 half xz = xx * w[0] + xe * w[1] - a[2], yz = yx * w[0] + ye * w[1] - b[2];
-                if (g->tying) {
-                    half of_xi = {0}, of_eta = {0};
-                    const int64_t each = g->tying / 2;
-                    const double *one = g->tied + p, *other = one + each * width;
-                    for (int64_t i = 0; i < each; i++, one += width, other += width)
-                        of_xi += tied[i] * NAME(load)(one), of_eta += tied[each + i] * NAME(load)(other);
-                    xz = xx * of_xi + xe * of_eta, yz = yx * of_xi + ye * of_eta;
-                }
+                if (g->tying) NAME(assumed_strains)(g, e, p, tied, &xz, &yz);
                 /* 0 - a avoids the negative zeros of a plate at rest. */
                 const half found[5] = {
                     0.0 - (xx * a[0] + xe * a[1]), 0.0 - (yx * b[0] + ye * b[1]),

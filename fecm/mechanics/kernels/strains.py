@@ -23,14 +23,14 @@ import numpy as np
 
 from fecm._typing import Bools, Floats
 from fecm.mechanics import strains as assumed_shear
-from fecm.mechanics.elements import gauss
+from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import interpolate, local_shape_functions
 from fecm.mechanics.kernels import LIBRARY, Doubles, Longs, Structure, filled, floats
 from fecm.mechanics.kernels.element_groups import jacobians, slopes_of_mapping
 from fecm.mechanics.membrane import QuadraticStrains
 from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.ply_stresses import PlyStresses, second_derivatives
-from fecm.mechanics.strains import FLAT, STRAINS, StrainField, strain_of_deflection
+from fecm.mechanics.strains import FLAT, STRAINS, Curvature, StrainField, strain_of_deflection
 
 TYING = 12  # tying points of w,1 or w,2, padded to a multiple of four; also in structures.h
 
@@ -84,13 +84,32 @@ def midplanes(stresses: PlyStresses, chosen: Bools) -> list[MidplaneStruct]:
         members = np.flatnonzero(chosen[family.rows])
         if len(members):
             part = family if len(members) == len(family.rows) else family.take(members)
-            structures.append(_structure(stresses, part, complete))
+            structures.append(
+                midplane(
+                    part,
+                    stresses.rule,
+                    initial=stresses.initial,
+                    curvature=stresses.curvature,
+                    nonlinear=stresses.nonlinear,
+                    complete=complete,
+                )
+            )
     return structures
 
 
-def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> MidplaneStruct:
-    """Return the structure of a family."""
-    rule = stresses.rule
+def midplane(
+    family: ElementBlock,
+    rule: Quadrature,
+    *,
+    initial: Floats | None = None,
+    curvature: Curvature = FLAT,
+    nonlinear: bool = False,
+    complete: bool = False,
+) -> MidplaneStruct:
+    """Return the structure of a family at the points of a rule.
+
+    With `complete` it has the derivatives at the centre, which need elements of nine nodes.
+    """
     congruence = family.congruence
     shapes = family.take(congruence.representatives)
     values, local = local_shape_functions(family, rule)
@@ -100,8 +119,6 @@ def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> M
     if complete:
         slopes = interpolate(shapes, gauss(1)).dN[:, 0]
         centre = np.concatenate([second_derivatives(shapes), slopes], axis=1)
-    initial = np.zeros(3) if stresses.initial is None else np.ascontiguousarray(stresses.initial)
-    curved = None if stresses.curvature == FLAT else strain_of_deflection(stresses.curvature)
     return MidplaneStruct(
         elements=len(family.rows),
         nodes=family.nodes.shape[1],
@@ -112,10 +129,10 @@ def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> M
         shape=np.ascontiguousarray(congruence.group, dtype=np.int64),
         table=table,
         metric=filled(inverse.swapaxes(1, 2)),
-        initial=initial,
-        curved=curved,
+        initial=np.zeros(3) if initial is None else np.ascontiguousarray(initial),
+        curved=None if curvature == FLAT else strain_of_deflection(curvature),
         centre=centre,
-        **(_quadratic(QuadraticStrains(shapes, rule)) if stresses.nonlinear else {}),
+        **(_quadratic(QuadraticStrains(shapes, rule)) if nonlinear else {}),
     )
 
 
@@ -171,9 +188,10 @@ class CompiledStrains(StrainField):
     @cached_property
     def _structures(self) -> list[StrainsStruct]:
         """Structure of each family."""
-        return [self._structure(family) for family in self.families]
+        return [self.structure(family) for family in self.families]
 
-    def _structure(self, family: ElementBlock) -> StrainsStruct:
+    def structure(self, family: ElementBlock) -> StrainsStruct:
+        """Return the structure of elements of the field with the same nodes present."""
         congruence = family.congruence
         values, local = local_shape_functions(family, self.rule)
         shapes = family.take(congruence.representatives)

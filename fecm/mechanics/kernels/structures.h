@@ -2,7 +2,7 @@
  *
  ** Python fills the structures and points them to arrays that it owns; the kernels allocate nothing that
  * outlives a call.  Each structure is declared again with ctypes, under its name and "Struct", in the Python
- * file of its kernel: plate.py and element_groups.py, strains.py, failure.py, and outside this folder
+ * file of its kernel: plate.py and element_groups.py, strains.py, failure.py, stretching.py, and outside this folder
  * impact_steps.py and impact_sweep.py.  A test reads this file and compares both sides.
  *
  * Shapes are written as in NumPy, in C order: the last index runs fastest.  Numbers are in the deck's units.
@@ -245,6 +245,18 @@ typedef struct {
     const double *tied;         /* (16, width) */
     const double *tied_strain;  /* (shapes, 3, 3) */
 } Midplane;
+
+/* Elements of a nonlinear plate with the same nodes present and the same laminate; see stretching.py. */
+typedef struct {
+    Midplane midplane;
+    Strains sheared;          /* the same elements, at the points of the transverse shear */
+    const double *area;       /* (elements, width): area of a point, 0 for padding */
+    const double *half;       /* (elements, width): half thickness, 0 near the load */
+    const double *shear_area; /* (elements, width of `sheared`) */
+    const double *stretching, *coupling, *compliance, *bending; /* (3, 3): A, B, A^-1, D - B A^-1 B */
+    const double *transverse;                                   /* (2, 2) */
+    const double *preload, *preload_strain;                     /* (3,) */
+} Stretched;
 
 /* Tying points of w,1 or w,2, padded to a multiple of four: six of e_11 or e_22, four of e_12. */
 enum { TYING = 12 };
