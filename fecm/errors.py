@@ -17,7 +17,7 @@ from fecm.deck.findings import DeckError
 from fecm.deck.layup import LayupError
 from fecm.deck.macros import RowsError
 from fecm.deck.units import UnitsError
-from fecm.exploration.explore import ExploreError
+from fecm.exploration.plates import ExploreError
 from fecm.identification.alignment import IdentifyError
 from fecm.location.location import LocateError
 from fecm.mechanics.failure import CriterionError

@@ -131,7 +131,7 @@ class Browser:
         """Addresses the page has asked for, without those inside the page."""
         sent = [one for one in self.events if one["method"] == "Network.requestWillBeSent"]
         values = [one["params"]["request"]["url"] for one in sent]
-        return [address for address in values if not address.startswith("data:")]
+        return [address for address in values if not address.startswith(("data:", "blob:"))]
 
     def complaints(self) -> list[dict[str, Any]]:
         """What the browser has to say: log, console, exceptions, and issues such as of the CSP."""

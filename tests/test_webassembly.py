@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +13,13 @@ from fecm.authoring.case import Case
 from fecm.mechanics import kernels
 from fecm.mechanics.kernels import stamp
 from fecm.mechanics.kernels.webassembly import PATH, sources_of
-from fecm.sweeps import responses
+from fecm.sweeps import reduced, responses
 from tests.test_kernels import compiled
+from tests.test_reduced_sweeps import DECK as STRETCHING
+from tests.test_reduced_sweeps import ENOUGH, SPEEDS
 from tests.test_sweep_kernels import ANY, DECK, FIRM, LAW, RIGID, RODS
 
+BLOWS: list[Case] = [{"velocity": speed} for speed in SPEEDS]
 ACR = DECK.replace(LAW, "EXPE ACR\n  1912000. 0.0006564")
 
 
@@ -33,29 +37,34 @@ def test_a_change_of_a_source_makes_the_module_stale(tmp_path: Path) -> None:
 
 @compiled
 @pytest.mark.parametrize(
-    ("deck", "cases"),
-    [(DECK, ANY), (RIGID, ANY), (DECK, RODS), (ACR, FIRM)],
-    ids=["rod", "rigid-mass", "rods", "yang-sun"],
+    ("deck", "cases", "options"),
+    [
+        (DECK, ANY, {}),
+        (RIGID, ANY, {}),
+        (DECK, RODS, {}),
+        (ACR, FIRM, {}),
+        (STRETCHING, BLOWS, {"model": "reduced", "modes": ENOUGH}),
+    ],
+    ids=["rod", "rigid-mass", "rods", "yang-sun", "stretching"],
 )
 @pytest.mark.long
 def test_webassembly_gives_the_forces_of_the_library(
-    deck: str, cases: list[Case], monkeypatch: pytest.MonkeyPatch
+    deck: str, cases: list[Case], options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("wasmtime")
     from fecm.verification.webassembly import WasmKernel
 
-    wanted = fecm.sweep(deck, cases=cases, history=True)
-    calls = 0
+    wanted = fecm.sweep(deck, cases=cases, history=True, **options)
+    kernel, calls = WasmKernel(), 0
 
-    def swept(response, rigid, given):  # type: ignore[no-untyped-def]
+    def swept(*given: Any) -> None:
         nonlocal calls
         calls += 1
-        found = np.empty_like(given.found)
-        WasmKernel().sweep_linear(response, rigid, given._replace(found=found))
-        given.found[:] = found
+        (kernel.sweep_reduced if options else kernel.sweep_linear)(*given)
 
     monkeypatch.setattr(responses, "sweep_linear", swept)
-    actual = fecm.sweep(deck, cases=cases, history=True)
+    monkeypatch.setattr(reduced, "sweep_reduced", swept)
+    actual = fecm.sweep(deck, cases=cases, history=True, **options)
     assert calls > 0
     assert actual.force is not None
     assert wanted.force is not None

@@ -61,7 +61,8 @@ def explore_command(
     Energy, mass, contact and toughness move, and with them force, deflection, the energy from which
     the plate delaminates, and the chance that it does.  The page is one file with the kernel of the
     sweeps inside: it opens in a browser, from a folder or a mail, without a network.  It says how
-    far the model holds, and the command that computes each state again.  The plate is linear.
+    far the model holds, and the command that computes each state again.  A plate with NONL is
+    reduced to bending modes, and compared with full runs before the page is written.
     """
     path = output or Path(f"{deck.stem}-explore.html")
     check_page(path, overwrite, [deck, *filter(None, [options["overlay"]])])

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import html
+import json
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fecm._errors import FecmError, FecmWarning
 from fecm._files import beside, check_outputs
 from fecm._options import documented, option, with_parameters_of
 from fecm.authoring.strike_values import strike_of
@@ -19,19 +18,22 @@ from fecm.authoring.values import OF_PLATE
 from fecm.deck.catalogue import system_of
 from fecm.deck.units import PREFIXED, PREFIXES, in_si, unit_names, unit_of
 from fecm.exploration.page import page
-from fecm.exploration.plates import SPANS, encoded, page_plates
+from fecm.exploration.plates import (
+    KINDS,
+    SPANS,
+    ExploreError,
+    page_plates,
+    run_quietly,
+)
 from fecm.judge import end
-from fecm.judge.limits import ENERGY_BALANCE, ITERATION, THRESHOLD
-from fecm.mechanics.impact_sweep import Given, ResultRow, SweepStruct
-from fecm.mechanics.kernels.webassembly import wasm_fields
+from fecm.mechanics.impact_sweep import Given, ResultRow
 from fecm.problem.loading import AnyDeck, load_deck, load_one
 from fecm.results.comparison import Measurement, measurement_of
 from fecm.results.metrics import METRICS
-from fecm.simulation.job import run_one
 from fecm.simulation.notes import STANDARD_GRAVITY
+from fecm.sweeps.backends import only_impacts
 from fecm.sweeps.case_tables import table_of_cases
 from fecm.sweeps.job import Named
-from fecm.sweeps.methods import SharedResponse
 from fecm.sweeps.plan import plan
 
 SUFFIXES = (".html", ".htm")
@@ -48,35 +50,34 @@ DIMENSIONS = {
     "giic": "force/length",
     "time": "time",
 }
+# Units of ratios.
+SIZES = {"none": "", "thickness": "h", "percent": "%"}
 # Constants that say what the end of an impact decides, by their names there.
 END_RULES = (
     "FALLEN", "CLEAR", "CLEAR_FREE", "PRESSED", "LIGHT", "GONE", "RESERVE", "RINGING",
 )  # fmt: skip
 
 
-class ExploreError(FecmError, ValueError):
-    """No page can be made of a deck."""
-
-
 @documented
 @dataclass(eq=False, repr=False)
 class Exploration:
-    """Page on which an impact on a linear plate follows sliders.
+    """Page on which an impact follows sliders.
 
-    The page is one file with the response of the plate and the compiled kernel of sweeps as
-    WebAssembly. It opens in a browser without a server or a network.
+    The page is one file with the plate and the compiled kernel of sweeps as WebAssembly. It opens
+    in a browser without a server or a network. A plate with `NONL` is reduced to bending modes,
+    and compared with full runs while the page is made.
 
     Parameters
     ----------
     deck : str, Path or Deck
-        Deck with a single problem, whose plate is linear.
+        Deck with a single problem, without one-sided supports.
     {parameters}
 
     Raises
     ------
     ExploreError
-        If the plate is not linear, the program has more than impact steps, or the page would be
-        too large.
+        If the deck has one-sided supports, the program has more than impact steps, the modes of a
+        plate with `NONL` do not give the peak force, or the page would be too large.
     CasesError
         If values of `vary` are invalid.
     DeckError
@@ -120,18 +121,18 @@ class Exploration:
         loaded = load_deck(self.deck)
         problem = load_one(loaded)
         cases = table_of_cases(self.vary, None, system=system_of(problem.deck)).cases
-        self._plan = plan(problem, cases, history=False)
-        if words := problem.deck.nonlinear_words:
+        if (words := problem.deck.nonlinear_words) not in KINDS:
             raise ExploreError(
-                f"the page superposes responses of a linear plate, and the deck has {words}: make "
-                "it without (fecm new --kinematics linear, --window held); the notes of a run then "
-                "say by how much the force is off"
+                f"the deck has {words}, and a page has no one-sided supports: take a window that "
+                "holds (fecm new --window held); the notes of a run then say how hard it pulls"
             )
-        if not isinstance(self._plan.method, SharedResponse):
+        if not only_impacts(problem, cases[0]):
             raise ExploreError(
                 "the page has impacts that start at rest, with steps of one size: the deck has "
                 "other steps, nodal forces or prescribed displacements"
             )
+        self._kind = KINDS[words]
+        self._plan = plan(problem, cases, modes=self._kind.modes)
         if not strike_of(problem.deck).velocity:
             raise ExploreError(
                 "the sliders start at the velocity of ROD, which must not be 0: give the deck one"
@@ -154,16 +155,14 @@ class Exploration:
     @cached_property
     def html(self) -> str:
         """The page."""
-        plates = list(page_plates(self._plan.settings, self._plan.cases))
-        size = sum(len(plate["structure"]["plate"]) for plate in plates)
+        result = run_quietly(self._problem.deck)  # the page has its notes
+        plates = list(page_plates(self._kind, self._plan.settings, self._plan.cases, result))
+        size = len(json.dumps(plates))
         if size > MOST:
             raise ExploreError(
                 f"the responses of {len(plates)} plates take {size / 1e6:.3g} MB, and a page has "
                 f"at most {MOST / 1e6:g} MB: leave out values of `vary`, or shorten the run"
             )
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FecmWarning)  # the page has the notes of the run
-            result = run_one(self._problem.deck)
         deck, names = self._problem.deck, unit_names(self._problem.deck)
         units = {name: unit_of(dimension, names) for name, dimension in DIMENSIONS.items()}
         data = {
@@ -172,11 +171,12 @@ class Exploration:
                 "name": self._file.name if self._file.is_file() else "deck.inp",
                 "text": deck.to_text(),
             },
-            "units": {name: [unit, *PREFIXED.get(unit, ("", 0))] for name, unit in units.items()},
+            "units": {
+                name: [unit, *PREFIXED.get(unit, ("", 0))] for name, unit in (units | SIZES).items()
+            },
             "prefixes": {str(power): prefix for power, prefix in PREFIXES.items()},
             "labels": {name: quantity.description for name, quantity in METRICS.items()},
             "gravity": STANDARD_GRAVITY / (in_si("length/time^2", names) or math.inf) or None,
-            "fields": list(wasm_fields(SweepStruct)),
             "given": [row.name for row in Given],
             "found": [row.name for row in ResultRow],
             "ends": {
@@ -186,16 +186,14 @@ class Exploration:
                     for name, meaning in end.ENDS.items()
                 },
             },
-            "balance": [ENERGY_BALANCE.value, ENERGY_BALANCE.page, ITERATION.page],
-            "elastic": [THRESHOLD.page, THRESHOLD.level],
             "spans": SPANS,
             "plates": plates,
             "notes": list(dict.fromkeys(result.notes)),
             "measured": self._measured
             and {
                 "name": self._measured.name,
-                "time": encoded(self._measured.time),
-                "force": encoded(self._measured.force),
+                "time": self._measured.time.tolist(),
+                "force": self._measured.force.tolist(),
             },
         }
         return page(data, result.time, result.force)
@@ -242,7 +240,7 @@ def explore(job: Exploration) -> Exploration:
     Parameters
     ----------
     deck : str, Path or Deck
-        Deck with a single problem, whose plate is linear.
+        Deck with a single problem, without one-sided supports.
     {parameters}
 
     Returns

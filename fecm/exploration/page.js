@@ -1,169 +1,22 @@
 "use strict";
-// Impacts on a linear plate as sliders move.  The kernel of the package, compiled to WebAssembly, computes
-// every contact force; this file hands it the values, takes numbers from its forces, and draws.
+// Impacts on a plate as sliders move.  The worker computes; this file has the sliders and the pictures.
 // All values are in the deck's units.
 const byId = name => document.getElementById(name);
 const source = document.documentElement.outerHTML; // before the page changes, to save it
-const data = JSON.parse(byId("data").textContent);
-const LANES = 8; // cases that the kernel computes in the time of one
-const CURVE = 40, DRAWS = 1000, SLICE = 12; // points, random impacts, ms of work between two events
+const data = JSON.parse(byId("data").textContent), {measured} = data;
 const PINS = 3;
-
-const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
-const doubles = text => new Float64Array(bytes(text).buffer);
-
-// Kernel --------------------------------------------------------------------------------------------------------
-
-/** The kernel with the memory of one plate. */
-class Kernel {
-  constructor(exports) {
-    this.exports = exports;
-    exports._initialize();
-    this.at = {};
-  }
-
-  /** Put a plate into the memory, in place of the last one. */
-  load(plate) {
-    Object.values(this.at).forEach(this.exports.free);
-    const values = plate.structure, arrays = {};
-    for (const [name, kind] of data.fields)
-      if (kind === "pointer" && name in values) arrays[name] = doubles(values[name]);
-    arrays.given = new Float64Array(data.given.length * LANES);
-    arrays.found = new Float64Array(data.found.length * LANES);
-    const steps = arrays.plate.length;
-    const sizes = {...Object.fromEntries(Object.entries(arrays).map(([name, array]) => [name, array.length])),
-                   force: steps * LANES, structure: 64};
-    this.at = Object.fromEntries(Object.entries(sizes).map(([name, size]) => [name, this.exports.malloc(8 * size)]));
-    if (Object.values(this.at).includes(0)) throw new Error("there is not enough memory");
-    for (const [name, array] of Object.entries(arrays)) this.view(name, array.length).set(array);
-    const view = new DataView(this.exports.memory.buffer, this.at.structure, 8 * sizes.structure);
-    for (const [name, kind, offset] of data.fields) {
-      if (kind === "pointer") view.setUint32(offset, this.at[name], true);
-      else if (kind === "double") view.setFloat64(offset, values[name], true);
-      else view.setBigInt64(offset, BigInt(name === "stride" ? LANES : values[name]), true);
-    }
-    this.plate = plate;
-    this.steps = steps;
-    this.enough = undefined;
-    this.dt = values.dt;
-    return this;
-  }
-
-  view(name, count) { return new Float64Array(this.exports.memory.buffer, this.at[name], count); }
-
-  /** Compute up to LANES impacts, and give the summary of each. */
-  run(impacts, steps = this.steps) {
-    const strike = this.plate.strike;
-    const rows = {K: i => i.k, Q: () => strike.q, CRITICAL: () => strike.critical, SLOPE: () => strike.slope,
-                  VELOCITY: i => i.velocity, FACTOR: i => i.mass / strike.unitMass};
-    const given = this.view("given", data.given.length * LANES);
-    data.given.forEach((name, row) => impacts.forEach((impact, lane) => { given[row * LANES + lane] = rows[name](impact); }));
-    const view = new DataView(this.exports.memory.buffer, this.at.structure);
-    for (const [name, , offset] of data.fields)
-      if (name === "cases") view.setBigInt64(offset, BigInt(impacts.length), true);
-      else if (name === "steps") view.setBigInt64(offset, BigInt(steps), true);
-    if (!this.exports.fecm_sweep(this.at.structure)) throw new Error("there is not enough memory");
-    const force = this.view("force", steps * impacts.length), found = this.view("found", data.found.length * LANES);
-    return impacts.map((impact, lane) => summary(this.plate, this.dt, impact, force.subarray(lane * steps, (lane + 1) * steps),
-      Object.fromEntries(data.found.map((name, row) => [name, found[row * LANES + lane]]))));
-  }
-
-  /** Compute an impact in as few steps as are likely to decide it, and in all if these do not. */
-  one(impact) {
-    const steps = Math.min(this.steps, this.enough ?? this.steps);
-    let [result] = this.run([impact], steps);
-    if (steps < this.steps && (!result.over || isNaN(result.max_deflection))) [result] = this.run([impact]);
-    this.enough = Math.ceil(1.15 * result.contactEnd / this.dt) + LANES;
-    return {...result, force: result.force.slice()};
-  }
-
-  /** Compute impacts whose peaks are wanted, in a short run, and those that it leaves open in a long one. */
-  peaks(impacts, steps) {
-    const results = this.run(impacts, steps);
-    const open = steps < this.steps ? results.flatMap((result, row) => isNaN(result.peak_force) ? [row] : []) : [];
-    if (open.length)
-      this.run(open.map(row => impacts[row])).forEach((result, index) => { results[open[index]] = result; });
-    return results;
-  }
-}
-
-// Numbers of an impact ------------------------------------------------------------------------------------------
-
-/** What fecm/results/metrics.py takes from the forces of a case; NaN where its end has not decided a value. */
-function summary(plate, dt, impact, force, found) {
-  const {mass, velocity} = impact, factor = plate.strike.factor, steps = force.length, end = steps * dt;
-  let impulse = 0, lever = 0, peak = 0, peakAt = 0, touching = 0, contacts = 0, lastAt = -1, begin = 0;
-  for (let n = 0; n < steps; n++) {
-    const f = force[n];
-    if (!(f > 0)) continue;
-    const weight = n + 1 < steps ? dt : 0.5 * dt;
-    impulse += weight * f;
-    lever += weight * f * (steps - 1 - n) * dt;
-    touching++;
-    if (lastAt !== n - 1 || n === 0) { contacts++; begin = n; }
-    lastAt = n;
-    if (f > peak) { peak = f; peakAt = n; }
-  }
-  const last = force[steps - 1], rebound = impulse / mass - velocity;
-  let present = 0;
-  if (last > 0) for (let n = begin; n < steps; n++) present = Math.max(present, force[n]);
-  const motion = {last, peak, present, leaving: rebound + plate.mobility * impulse, ratio: mass / plate.mass,
-                  position: velocity * end - lever * (1 / mass + plate.mobility),
-                  speed: found.LARGEST_DW / dt, energy: found.BENT_WORK, compliance: found.COMPLIANCE};
-  const held = plate.mobility === 0, reach = Math.sqrt(2 * data.ends.rules.RESERVE * motion.compliance * Math.max(motion.energy, 0));
-  const state = endOf(motion, held, reach), over = state === "contact over", known = over || data.ends.words[state][0] !== "outside the model";
-  const where = (mask, value) => mask ? value : NaN;
-  const limit = plate.threshold ? plate.threshold.force * Math.sqrt(impact.giic / plate.threshold.toughness) : NaN;
-  const settled = over && (!held || reach <= data.ends.rules.RINGING * found.HIGHEST);
-  const lost = found.LOST + plate.nodeMass * found.LARGEST_DDW ** 2 / (8 * dt * dt);
-  return {
-    impact, force, dt, end: state, reached: factor * peak, limit, over,
-    balance: found.INITIAL > 0 ? lost / found.INITIAL : lost, unconverged: found.UNCONVERGED,
-    deepest: found.DEEPEST, highest: held ? found.HIGHEST : NaN, contactEnd: (lastAt + 1) * dt,
-    peak_force: where(known, factor * peak), time_of_peak: where(known && touching, (peakAt + 1) * dt),
-    contacts: where(over, contacts), contact_time: where(over, touching * dt),
-    max_deflection: where(settled, found.HIGHEST),
-    max_indentation: where(over || (known && found.INDENTATION < found.DEEPEST), found.DEEPEST),
-    permanent_indentation: where(over, found.PERMANENT), impulse: where(over, factor * impulse),
-    rebound_velocity: where(over, rebound), energy_absorbed: where(over, factor * 0.5 * mass * (velocity ** 2 - rebound ** 2)),
-    contact_loop: where(over, factor * found.CONTACT_WORK),
-  };
-}
-
-/** State of the contact at the end of a case, as fecm/judge/end.py decides it. */
-function endOf(m, held, reach) {
-  const {CLEAR, CLEAR_FREE, PRESSED, LIGHT, FALLEN, GONE} = data.ends.rules;
-  const clear = (held ? CLEAR : CLEAR_FREE) + PRESSED * (m.last > 0 ? m.last / m.peak : 0);
-  const isClear = m.leaving > clear * m.speed || (m.leaving > 0 && m.ratio < LIGHT);
-  if (m.last > 0)
-    return isClear && m.last < FALLEN * Math.min(m.present, m.peak) ? "in contact, peak passed" : "in contact, peak not reached";
-  if (m.leaving < 0) return "between contacts";
-  const near = m.leaving <= GONE * m.speed && !(m.position < -reach);
-  return near ? (isClear ? "peak passed, may touch again" : "may touch again") : "contact over";
-}
 
 /** Judgements of a result, in the words of the package's limits. */
 function judgements(plate, result) {
-  const rows = [], {deflection, indentation} = plate.limits;
-  const row = (quantity, size, level, words) => rows.push({quantity, size, level, words});
-  const limited = (limit, value, thickness) => {
-    if (isNaN(value) || !isFinite(limit.most)) return;
-    const ratio = value / thickness, beyond = value > limit.most;
-    const soft = limit === deflection && beyond ? `; ${plate.softness.findLast(([at]) => at <= ratio + 0.025)?.[1] ?? ""}` : "";
-    row(limit.quantity, `${digits(ratio, 3)} h`, beyond ? limit.level : "within range", limit.words + soft);
-  };
-  limited(deflection, result.highest, plate.thickness);
-  limited(indentation, result.deepest, plate.indented);
-  if (result.limit > 0) {
-    const beyond = result.reached > plate.crossed * result.limit;
-    row("force over the delamination threshold", digits(result.reached / result.limit, 3), beyond ? data.elastic[1] : "within range", data.elastic[0]);
-  }
+  const rows = plate.bounds.filter(bound => !isNaN(result[bound.of])).map(bound => {
+    const value = result[bound.of], size = value / (bound.scale ?? 1), isBeyond = value > bound.most;
+    const more = isBeyond && bound.beyond?.findLast(([at]) => at <= size + 0.025);
+    return {quantity: bound.quantity, size: quantity(bound.unit ?? "none", size, 3), level: isBeyond ? bound.level : "within range",
+            words: more ? `${bound.words}; ${more[1]}` : bound.words};
+  });
   const [level, words] = data.ends.words[result.end];
-  row("end of the contact", result.end, level, words);
-  if (result.unconverged) row("steps", String(result.unconverged), "doubtful", data.balance[2]);
-  row("energy balance", `${digits(100 * result.balance, 2)} %`, result.balance < data.balance[0] ? "within range" : "outside the model", data.balance[1]);
-  row("failure of plies", "–", "not judged", "this page has forces only: a run with FAIL has the exposures");
-  return rows;
+  return [...rows, {quantity: "end of the contact", size: result.end, level, words},
+    {quantity: plate.unjudged, size: "–", level: "not judged", words: "this page has forces only: a run with FAIL has the exposures"}];
 }
 
 // Texts ---------------------------------------------------------------------------------------------------------
@@ -327,8 +180,8 @@ function build() {
     fieldset(group).append(element("div", {class: "row choice"}, element("label", {for: select.id}, label), select));
   };
   names.forEach((name, row) => {
-    const select = element("select", {id: `plate-${row}`}, ...new Set(data.plates.map(plate => plate.values[name])));
-    [...new Set(data.plates.map(plate => plate.values[name]))].forEach((value, n) => select.append(element("option", {value}, value)));
+    const values = [...new Set(data.plates.map(plate => plate.values[name]))];
+    const select = element("select", {id: `plate-${row}`}, ...values.map(value => element("option", {value}, value)));
     select.value = state.plate[name];
     select.addEventListener("change", () => { state.plate = {...state.plate, [name]: select.value}; changed(); });
     fieldset("Plate").append(element("div", {class: "row choice"}, element("label", {for: select.id}, name.replaceAll("_", " ")), select));
@@ -370,91 +223,33 @@ function row({group, name, label, ends, scatter}) {
   return element("div", {class: "row"}, element("label", {for: field.id}, label), field, element("span", {}, unit), range);
 }
 
-// Work in slices ------------------------------------------------------------------------------------------------
+// Worker --------------------------------------------------------------------------------------------------------
 
-let kernel, now, work = null, timer = false;
-const shown = {found: null, curve: null, draws: null};
+let worker, asked = 0, now = null;
+const shown = {number: 0, found: null, curve: null, draws: null, extended: false, done: false};
 
+/** Ask the worker for the state of the sliders; what is shown stays until the answer is there. */
 function changed() {
-  const plate = plateOf(state);
-  if (kernel.plate !== plate) kernel.load(plate);
-  now = kernel.one(impactOf(state, plate));
-  for (const name of ["curve", "draws"]) byId(name).classList.add("pending");
   keep();
-  work = background(plate, structuredClone(state));
-  draw();
-  if (!timer) { timer = true; setTimeout(slice); }
+  asked++;
+  worker.postMessage({number: asked, ...question(state), scatter: state.scatter});
+  pending();
 }
 
-/** Do a part of the work that answers to sliders later; an event in between may replace it. */
-function slice() {
-  timer = false;
-  const begin = performance.now();
-  while (work && performance.now() - begin < SLICE) if (work.next().done) { work = null; draw(); }
-  document.body.dataset.ready = String(!work);
-  if (work) { timer = true; setTimeout(slice); }
+const question = wanted => ({plate: data.plates.indexOf(plateOf(wanted)), impact: impactOf(wanted)});
+
+function answered({data: answer}) {
+  if (answer.pins) answer.pins.forEach((result, n) => { state.pins[n].result = result; });
+  else Object.assign(shown, {done: false}, answer);
+  now = shown.now;
+  if (now) draw();
+  pending();
 }
 
-/** Energy of the threshold, curve over energies, and draws: each yield is a moment for an event. */
-function* background(plate, at) {
-  const base = impactOf(at, plate), energy = velocity => energyOf({...plate.strike, mass: base.mass}, velocity);
-  const steps = Math.min(kernel.steps, kernel.enough);
-  const speed = value => Math.sqrt(2 * value / plate.strike.factor / base.mass);
-  const many = function* (impacts) {
-    const results = [];
-    for (let n = 0; n < impacts.length; n += LANES) {
-      results.push(...kernel.peaks(impacts.slice(n, n + LANES), steps).map(({reached, peak_force, limit}) => ({reached, peak_force, limit})));
-      yield;
-    }
-    return results;
-  };
-  shown.found = now.limit > 0 ? energy(yield* searched(base, now.limit, many)) : null;
-  draw();
-  const widest = data.spans.energy[1] * atRest.energy, threshold = shown.found < 4 * widest ? 1.3 * shown.found : 0;
-  const most = 1.04 * Math.max(widest, energy(base.velocity), threshold);
-  const energies = Array.from({length: CURVE}, (_, n) => most * (n + 1) / CURVE);
-  const peaks = yield* many(energies.map(value => ({...base, velocity: speed(value)})));
-  shown.curve = {energies: [0, ...energies], peaks: [0, ...peaks.map(one => one.reached)], most};
-  byId("curve").classList.remove("pending");
-  draw();
-  shown.draws = null;
-  if (now.limit > 0 && Object.values(at.scatter).some(size => size > 0)) {
-    const normal = normals(1), spread = (value, size) => value * Math.exp(0.01 * size * normal());
-    const impacts = Array.from({length: DRAWS}, () => ({
-      ...base, velocity: speed(spread(energy(base.velocity), at.scatter.energy)), k: spread(base.k, at.scatter.k), giic: spread(base.giic, at.scatter.giic)}));
-    const results = yield* many(impacts);
-    shown.draws = {ratios: results.map(one => one.reached / one.limit), open: results.filter(one => isNaN(one.peak_force) && one.reached < one.limit).length};
-  }
-  byId("draws").classList.remove("pending");
-}
-
-/** Lowest velocity from 1/100 to 100 times that of an impact at which its peak reaches a force, as a sweep searches it. */
-function* searched(base, force, many) {
-  let trials = Array.from({length: 25}, (_, n) => base.velocity * 10 ** (n / 6 - 2));
-  for (let round = 0; round < 12; round++) {
-    const peaks = (yield* many(trials.map(velocity => ({...base, velocity})))).map(one => one.reached);
-    const after = peaks.findIndex(peak => peak >= force);
-    if (after < 1) return NaN;
-    const low = trials[after - 1], high = trials[after], width = high - low;
-    if (width <= 1e-6 * high) return high;
-    const share = Math.log(force / peaks[after - 1]) / Math.log(peaks[after] / peaks[after - 1]);
-    const guess = low * (high / low) ** (share > 0 && share < 1 ? share : 0.5);
-    const inside = [0.01, 1e-4, 1e-7].flatMap(part => [guess - part * width, guess + part * width]);
-    trials = [low, ...inside.filter(value => value > low && value < high), high].sort((a, b) => a - b);
-  }
-  return trials.at(-1);
-}
-
-/** Generator of standard normal numbers: the same for every state, so that a chance changes smoothly. */
-function normals(seed) {
-  let a = seed;
-  const uniform = () => {
-    a = (a + 0x6d2b79f5) | 0;
-    let t = Math.imul(a ^ (a >>> 15), 1 | a);
-    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
-    return ((t ^ (t >>> 14)) >>> 0) / 4294967296;
-  };
-  return () => Math.sqrt(-2 * Math.log(1 - uniform())) * Math.cos(2 * Math.PI * uniform());
+function pending() {
+  const isPending = shown.number !== asked || !shown.done;
+  document.body.dataset.ready = String(!isPending);
+  for (const name of ["from", "curve", "draws", "commands"]) byId(name)?.setAttribute("aria-busy", isPending);
 }
 
 // Page ----------------------------------------------------------------------------------------------------------
@@ -472,7 +267,7 @@ function draw() {
   const energy = energyOf({...plate.strike, mass: now.impact.mass}, now.impact.velocity);
   const chance = shown.draws && shown.draws.ratios.filter(ratio => ratio >= 1).length / shown.draws.ratios.length;
   const line = delaminates === null ? ["Peak force: ", element("strong", {}, quantity("peak_force", now.peak_force))]
-    : ["Delaminates: ", element("strong", {}, delaminates ? "yes" : isNaN(now.peak_force) ? "open" : "no"), `; ${from}`];
+    : ["Delaminates: ", element("strong", {}, delaminates ? "yes" : isNaN(now.peak_force) ? "open" : "no"), element("span", {id: "from"}, from && `; ${from}`)];
   const doubts = rows.filter(one => ["outside", "doubtful"].includes(tag(one.level)));
   byId("answer").className = worst;
   byId("answer").replaceChildren(element("p", {}, ...line), ...(doubts.length ? [element("p", {}, `${worst === "outside" ? "Outside the model" : "Doubtful"}: ${doubts.map(one => `${one.quantity} ${one.size}`).join(", ")}`)] : []));
@@ -507,8 +302,7 @@ function draw() {
       .concat(now.limit > 0 ? [["delamination threshold", ...[now, ...pins.map(pin => pin.result)].map(result => cell("peak_force", result.limit))],
         ["energy from which it delaminates", cell("energy", found ?? NaN), ...pins.map(pin => cell("energy", pin.found ?? NaN))],
         ...(chance === null ? [] : [["chance that it delaminates", element("data", {value: chance}, digits(chance, 3)), ...pins.map(() => "")]])] : []));
-  byId("commands").classList.toggle("pending", Boolean(work));
-  if (!work) commands(chance !== null); // once the page has answered
+  if (shown.done) commands(chance !== null);
 }
 
 const cell = (name, value) => element("data", {value: String(value)}, name === "contacts" ? String(value) : quantity(name, value));
@@ -537,18 +331,15 @@ const quoted = text => /^[\w@%+=:,.\/-]+$/.test(text) && !text.startsWith("-") ?
 
 /** Options that give the state, without the names left out. */
 function options(out = []) {
-  const {velocity} = impactOf(state), values = {}, plate = plateOf(state), steps = plate.program;
+  const {velocity} = impactOf(state), values = {}, plate = plateOf(state);
   if (state.speed === "energy") values.energy = state.energy; else values.velocity = velocity;
   if (state.mass !== atRest.mass) values.mass = state.mass;
   if (state.law === "radius") values.radius = state.radius; else if (state.k !== atRest.k) values.k = state.k;
   if (state.giic !== atRest.giic) values.giic = state.giic;
-  // The page goes on for longer than the program of the deck, where the impact does.
-  if (steps < kernel.steps && !names.includes("duration")) {
-    const [result] = kernel.run([impactOf(state)], steps);
-    if (!result.over || isNaN(result.max_deflection)) values.duration = Number((kernel.steps * kernel.dt).toPrecision(6));
-  }
+  if (shown.extended && !names.includes("duration")) values.duration = Number((plate.steps * plate.dt).toPrecision(6));
   const all = [...Object.entries(values).filter(([name]) => !out.includes(name)), ...names.map(name => [name, state.plate[name]])];
-  return all.map(([name, value]) => `--vary ${quoted(`${name}=${value}`)}`).join(" ");
+  const rounded = value => typeof value === "number" ? Number(value.toPrecision(7)) : value;
+  return [...all.map(([name, value]) => `--vary ${quoted(`${name}=${rounded(value)}`)}`), plate.options].filter(Boolean).join(" ");
 }
 
 function commands(withChance) {
@@ -559,7 +350,7 @@ function commands(withChance) {
   if (withChance && state.law === "k") {
     const {velocity, mass, k, giic} = impactOf(state), values = {energy: energyOf({...plateOf(state).strike, mass}, velocity), k, giic};
     const random = Object.entries(state.scatter).filter(([, size]) => size > 0);
-    list.push(["the chance, with draws of its own", parts(`${random.map(([key, size]) => `--random ${key}=lognormal:${values[key]},${size / 100}`).join(" ")} --samples ${DRAWS} --exceed peak_force=threshold`,
+    list.push(["the chance, with draws of its own", parts(`${random.map(([key, size]) => `--random ${key}=lognormal:${values[key]},${size / 100}`).join(" ")} --samples ${plateOf(state).draws} --exceed peak_force=threshold`,
       random.map(([key]) => key).concat(random.some(([key]) => key === "energy") ? ["velocity"] : []))]);
   }
   byId("commands").replaceChildren(...list.map(([label, text], n) => {
@@ -598,13 +389,12 @@ function take(given) {
   for (const pin of Array.isArray(given.pins) ? given.pins.slice(0, PINS) : []) addPin(pin?.state);
 }
 
-/** Compute the impact of a state and keep its curve. */
+/** Keep a state beside the present one; the worker computes its curve. */
 function addPin(given) {
   const before = state;
   state = structuredClone(atRest);
   take({...given, pins: []});
-  const plate = plateOf(state);
-  before.pins.push({state, result: kernel.load(plate).one(impactOf(state, plate)), found: null});
+  before.pins.push({state, result: null, found: null});
   state = before;
 }
 
@@ -616,15 +406,16 @@ function download(name, type, text) {
 
 const stem = data.deck.name.replace(/^.*[/\\]/, "").replace(/\.[^.]*$/, "");
 const head = (name, label) => data.units[name][0] ? `${label} (${data.units[name][0]})` : label;
-const measured = data.measured && {name: data.measured.name, time: doubles(data.measured.time), force: doubles(data.measured.force)};
 
-async function start() {
-  const {instance} = await WebAssembly.instantiate(bytes(byId("kernel").textContent), {});
-  kernel = new Kernel(instance.exports);
-  kernel.load(first);
+function start() {
   take(JSON.parse(byId("state").textContent));
   try { take(JSON.parse(decodeURIComponent(location.hash.slice(1)))); } catch { /* no state in the address */ }
-  byId("about").textContent = `Linear plate, ${kernel.steps} steps of ${quantity("time", kernel.dt)}. Every force is computed in this page by the kernel of fecm.`;
+  const script = URL.createObjectURL(new Blob([byId("worker").textContent], {type: "text/javascript"}));
+  worker = new Worker(script);
+  worker.addEventListener("message", answered);
+  worker.addEventListener("error", event => failed(event.message));
+  worker.postMessage({data, kernel: byId("kernel").textContent, pins: state.pins.map(pin => question(pin.state))});
+  byId("about").textContent = `${first.model}, ${first.steps} steps of ${quantity("time", first.dt)}. Every force is computed in this page by the kernel of fecm.`;
   byId("notes").replaceChildren(...(data.notes.length ? [element("h3", {}, names.length ? "Notes of the run of the deck as it is" : "Notes of the deck's own run"), element("ul", {}, ...data.notes.map(text => element("li", {}, text)))] : []));
   byId("own-run").hidden = true;
   byId("page").hidden = false;
@@ -653,4 +444,11 @@ async function start() {
   changed();
 }
 
-start().catch(error => { byId("own-run").hidden = false; byId("page").hidden = true; byId("own-run").append(element("p", {}, String(error))); });
+/** Show the run of the deck instead of the sliders. */
+function failed(reason) {
+  byId("own-run").hidden = false;
+  byId("page").hidden = true;
+  byId("own-run").append(element("p", {}, String(reason)));
+}
+
+try { start(); } catch (error) { failed(error); }

@@ -1,6 +1,7 @@
 """The page: template, style, script, data and kernel as one file that asks for nothing.
 
-The policy of the page allows its own script and style, by their digests, and the kernel. Texts of
+The policy of the page allows its own script and style, by their digests, the kernel, and the worker
+that the script starts. Texts of
 the deck are JSON, whose ``<`` is escaped, and the script puts them in as text nodes.
 """
 
@@ -22,7 +23,8 @@ from fecm.mechanics.kernels.webassembly import PATH
 ROOM = "fecm.exploration"
 POLICY = (
     "default-src 'none'; script-src 'sha256-{script}' 'wasm-unsafe-eval'; "
-    "style-src 'sha256-{style}'; img-src data:; base-uri 'none'; form-action 'none'"
+    "worker-src blob:; style-src 'sha256-{style}'; img-src data:; base-uri 'none'; "
+    "form-action 'none'"
 )
 POINTS = 400  # of the picture of the deck's own run
 
@@ -30,13 +32,16 @@ POINTS = 400  # of the picture of the deck's own run
 def page(data: Mapping[str, Any], time: Floats, force: Floats) -> str:
     """Return the HTML of a page; `time` and `force` are of the deck's own run."""
     room = resources.files(ROOM)
-    texts = {name: room.joinpath(f"page.{name}").read_text("utf-8") for name in ("css", "js")}
+    script, worker, style = (
+        room.joinpath(name).read_text("utf-8") for name in ("page.js", "worker.js", "page.css")
+    )
     values = {
-        "policy": POLICY.format(script=_digest(texts["js"]), style=_digest(texts["css"])),
+        "policy": POLICY.format(script=_digest(script), style=_digest(style)),
         "version": html.escape(__version__),
         "title": html.escape(printable(data["title"])),
-        "style": texts["css"],
-        "script": texts["js"],
+        "style": style,
+        "script": script,
+        "worker": worker,
         "picture": _picture(time, force),
         "data": script_json(data),
         "kernel": base64.b64encode(PATH.read_bytes()).decode("ascii"),

@@ -1,4 +1,4 @@
-"""What a page needs of a plate and its impacts: the response to a unit force, scales and limits.
+"""What a page needs of a plate and its impacts: what the kernel takes, scales and limits.
 
 All values are in the deck's units; forces, masses and k are those of the deck's part of a symmetric
 plate, thresholds those of the whole plate.
@@ -7,30 +7,47 @@ plate, thresholds those of the whole plate.
 from __future__ import annotations
 
 import base64
+import warnings
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from itertools import product
-from typing import Any
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
+from fecm._errors import FecmError, FecmWarning
 from fecm._typing import Floats
 from fecm.authoring.case import Case, CasesError
 from fecm.authoring.strike_values import set_radius, strike_of
-from fecm.authoring.time_values import with_clock
+from fecm.authoring.time_values import duration_of, with_clock
 from fecm.authoring.values import apply_case
-from fecm.judge.limits import INDENTATION, THRESHOLD
+from fecm.deck.model import Deck
+from fecm.deck.units import quantity, unit_names, unit_of
+from fecm.judge.limits import (
+    ENERGY_BALANCE,
+    INDENTATION,
+    ITERATION,
+    THRESHOLD,
+    ModelLimit,
+    TrustLevel,
+)
 from fecm.judge.threshold import from_threshold
 from fecm.mechanics.impact_steps import kernel_law
 from fecm.mechanics.impact_sweep import Swept, sweep_structure
+from fecm.mechanics.kernels import Structure
+from fecm.mechanics.kernels.webassembly import wasm_fields
 from fecm.mechanics.projectile import WilsonStep
+from fecm.mechanics.reduced_plate import motion_struct
 from fecm.mechanics.rod_modes import ProjectileModes
 from fecm.problem.problem import Problem
-from fecm.sweeps.backends import ImpulseResponse, PlateResponse
+from fecm.results.result import Result
+from fecm.simulation.job import run_one
+from fecm.sweeps.backends import BendingModes, ImpulseResponse
 from fecm.sweeps.impact_columns import Impacts, impacts_of
 from fecm.sweeps.limits import PEAK_FORCE
 from fecm.sweeps.outcome import About, Status
+from fecm.sweeps.reduced import LIMIT, MODES, REDUCED, by_halvings
 from fecm.sweeps.task import Settings
 
 # Factors on the deck's values at the ends of the sliders.
@@ -42,45 +59,176 @@ SPANS = {
 }
 # Deflections over the thickness at which the error of a linear plate is put into words.
 RATIOS = np.concatenate([np.arange(0.3, 1.0, 0.05), np.arange(1.0, 5.2, 0.25)])
+# Factors on the deck's energy at which a plate in modes is compared with full runs: its own, and
+# the next ones until they agree.
+COMPARED = (1.0, SPANS["energy"][1], 2.5)
+
+Lengthened = TypeVar("Lengthened", ImpulseResponse, BendingModes)
 
 
-def page_plates(settings: Settings, cases: Sequence[Case]) -> Iterator[dict[str, Any]]:
-    """Yield the plate of each case as a mapping for JSON."""
+class ExploreError(FecmError, ValueError):
+    """No page can be made of a deck."""
+
+
+class PagePlate(ABC):
+    """A plate of a page: how the kernel computes its impacts, and what bounds its model."""
+
+    modes: ClassVar[int | None] = None  # bending modes of the reduced model; None of full plates
+    model: ClassVar[str]
+    options: ClassVar[str] = ""  # of a sweep that computes the same
+    function: ClassVar[str]  # of the kernel
+    draws: ClassVar[int]  # random impacts of a chance
+    search: ClassVar[tuple[int, float]]  # velocities that a search tries first, and their span
+    unjudged: ClassVar[str]
+
+    def __init__(self, problem: Problem, impacts: Impacts) -> None:
+        self._problem, self._impacts = problem, impacts
+        self.dt, self.steps, self.node_mass = 0.0, 0, 0.0
+
+    @abstractmethod
+    def structures(self, swept: Swept) -> Iterator[Structure]:
+        """Yield the arguments of the function."""
+
+    @abstractmethod
+    def bounds(self, own: Result | None) -> Iterator[dict[str, Any]]:
+        """Yield what bounds the model; `own` is the run of the deck, if it was run.
+
+        Raises ExploreError if the model does not hold for the deck's impact.
+        """
+
+
+class LinearPlate(PagePlate):
+    """A linear plate, by its response to a unit force."""
+
+    model = "Linear plate"
+    function = "fecm_sweep"
+    draws, search = 1000, (25, 100.0)
+    unjudged = "failure of plies"
+
+    def __init__(self, problem: Problem, impacts: Impacts) -> None:
+        super().__init__(problem, impacts)
+        self._response = _long_enough(ImpulseResponse(problem), problem, impacts).response
+        self.dt, self.steps = self._response.dt, self._response.steps
+        self.node_mass = self._response.node_mass
+
+    def structures(self, swept: Swept) -> Iterator[Structure]:
+        """Yield the impacts with the response."""
+        response = self._response
+        yield sweep_structure(response.response, response.mobility * response.dt**2, swept)
+
+    def bounds(self, own: Result | None) -> Iterator[dict[str, Any]]:
+        """Yield the limit of the deflection, with the error of the force beyond it."""
+        judge = self._problem.judge
+        yield {
+            **_bound(judge.deflection, "highest", float(judge.largest(judge.deflection))),
+            "unit": "thickness",
+            "scale": judge.thickness,
+            "beyond": [(round(float(ratio), 2), judge.softness(ratio)) for ratio in RATIOS],
+        }
+
+
+class ReducedPlate(PagePlate):
+    """A plate that stretches as it bends, in some bending modes."""
+
+    modes = MODES
+    model = f"Stretching plate in {MODES} bending modes"
+    options = f"--model {REDUCED}"
+    function = "fecm_reduced"
+    draws, search = 200, (16, 4.0)
+    unjudged = "failure of plies, slope and strain"
+
+    def __init__(self, problem: Problem, impacts: Impacts) -> None:
+        super().__init__(problem, impacts)
+        modes = BendingModes(problem, (), MODES, history=False, has_fields=False)
+        self._backend = _long_enough(modes, problem, impacts)
+        plate = self._backend.plate
+        self._plate = plate.halved(max(by_halvings(plate, _corners(problem, impacts, "k"))))
+        self.dt, self.steps = self._plate.dt, self._plate.steps
+
+    def structures(self, swept: Swept) -> Iterator[Structure]:
+        """Yield the impacts, and the plate."""
+        yield sweep_structure(np.empty(0), 0.0, swept)
+        yield motion_struct(self._plate.plate, self.dt)
+
+    def bounds(self, own: Result | None) -> Iterator[dict[str, Any]]:
+        """Yield the largest energy at which the peak force agrees with a full run."""
+        strike = strike_of(self._problem.deck)
+        unit = unit_of("force*length", unit_names(self._problem.deck))
+        texts, most = [], 0.0
+        for factor in COMPARED:
+            difference = self._difference(factor, own if factor == 1.0 else None)
+            texts.append(f"{difference:+.1%} at {quantity(factor * strike.energy, unit)}")
+            if abs(difference) <= LIMIT:
+                most = max(most, factor * strike.energy)
+            if not most:
+                raise ExploreError(
+                    f"the peak force in {MODES} bending modes differs from that of a full run by "
+                    f"{texts[0]}, and a page allows {LIMIT:.0%}: make the deck without NONL (fecm "
+                    "new --kinematics linear); the notes of a run then say by how much the force "
+                    "is off"
+                )
+            if most > strike.energy:
+                break
+        yield {
+            "quantity": "energy",
+            "of": "energy",
+            "most": most,
+            "level": TrustLevel.DOUBTFUL,
+            "words": f"peak force in {MODES} bending modes, less that of full runs: "
+            f"{', '.join(texts)}; a sweep with {self.options} compares each state",
+            "unit": "energy",
+        }
+
+    def _difference(self, factor: float, run: Result | None) -> float:
+        """Return the relative difference of the peak from a full run at a factor on the energy."""
+        velocity = self._impacts.velocity * factor**0.5
+        impacts = self._impacts.at_velocities(np.zeros(1, dtype=np.intp), velocity)
+        outcome = self._backend.outcomes(impacts, judged=False)
+        full = run or run_quietly(impacts.deck(0))
+        return float(outcome.columns[PEAK_FORCE][0] / full.peak_force - 1.0)
+
+
+# Kinds of plates by the segments that make a deck nonlinear.
+KINDS: Mapping[str, type[PagePlate]] = {"": LinearPlate, "NONL": ReducedPlate}
+
+
+def page_plates(
+    kind: type[PagePlate], settings: Settings, cases: Sequence[Case], own: Result
+) -> Iterator[dict[str, Any]]:
+    """Yield the plate of each case as a mapping for JSON; `own` is the run of the deck."""
     for case in cases:
         problem = with_clock(apply_case(settings.deck, case), settings.clock, case)
         (impacts, faults) = impacts_of(problem, [0], [{}])
         if impacts is None:
             raise CasesError(faults[0])
+        plate = kind(problem, impacts)
         yield {
             "values": {name: str(value) for name, value in case.items()},
-            "program": problem.work.steps,
-            **_response(_long_enough(problem, impacts), impacts),
-            **_strike(problem, impacts),
-            **_judged(problem),
+            "model": plate.model,
+            "options": plate.options,
+            "function": plate.function,
+            "draws": plate.draws,
+            "search": plate.search,
+            "dt": plate.dt,
+            "steps": plate.steps,
+            "program": duration_of(problem),
+            "nodeMass": plate.node_mass,
+            "mobility": problem.judge.mobility,
+            "mass": problem.judge.plate_mass,
+            "thickness": problem.judge.thickness,
+            "structures": [*map(_encoded, plate.structures(_swept(plate, impacts)))],
+            "strike": _strike(problem, impacts),
+            "threshold": _threshold(problem),
+            "bounds": [*plate.bounds(None if case else own), *_bounds(problem)],
+            "unjudged": plate.unjudged,
         }
 
 
-def _long_enough(problem: Problem, impacts: Impacts) -> PlateResponse:
-    """Return the shortest response of a plate after which all impacts of the sliders are over."""
-    backend = ImpulseResponse(problem)
-    ends = SPANS["energy"], SPANS["mass"] if _scales(impacts) else (1.0,)
-    energies, masses = np.array(list(product(*ends))).T
-    rows = np.zeros(len(masses), dtype=np.intp)
-    velocities = impacts.velocity[rows] * np.sqrt(energies / masses)
-    corners = replace(
-        impacts.at_velocities(rows, velocities),
-        mass=impacts.mass[rows] * masses,
-        scale=impacts.scale[rows] * masses,
-    )
-    # A heavier projectile stays longer: the duration of the deck alone is hardly ever enough.
-    longer = backend
-    for factor in backend.durations[1:] if _scales(impacts) else backend.durations:
-        longer = backend.lengthened(factor)
-        columns = longer.outcomes(corners, judged=False).columns
-        is_over = (columns[About.STATUS] == Status.OK) & np.isfinite(columns[PEAK_FORCE])
-        if is_over.all():
-            break
-    return longer.response
+def run_quietly(deck: Deck) -> Result:
+    """Run a deck; the page says what the warnings say."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FecmWarning)
+        return run_one(deck)
 
 
 def _scales(impacts: Impacts) -> bool:
@@ -88,26 +236,56 @@ def _scales(impacts: Impacts) -> bool:
     return impacts.kinds[0].scales
 
 
-def _response(plate: PlateResponse, impacts: Impacts) -> dict[str, Any]:
-    """Return what the kernel takes; arrays are base64 of doubles."""
+def _corners(problem: Problem, impacts: Impacts, *more: str) -> Impacts:
+    """Return the impacts at the ends of the sliders of energy and mass, and of more names."""
+    strike = strike_of(problem.deck)
+    values = {"energy": strike.energy, "k": float(impacts.constants.k[0])}
+    names = ["energy", *more]
+    if _scales(impacts):
+        values["mass"] = strike.projectile.total_mass
+        names.append("mass")
+    ends = [[values[name] * factor for factor in SPANS[name]] for name in names]
+    cases: list[Case] = [dict(zip(names, corner, strict=True)) for corner in product(*ends)]
+    corners, faults = impacts_of(problem, range(len(cases)), cases)
+    if corners is None or faults:
+        raise CasesError(next(iter(faults.values())))
+    return corners
+
+
+def _long_enough(backend: Lengthened, problem: Problem, impacts: Impacts) -> Lengthened:
+    """Return the shortest run of a plate after which all impacts of the sliders are over."""
+    corners, longer = _corners(problem, impacts), backend
+    # A heavier projectile stays longer: the duration of the deck alone is hardly ever enough.
+    for factor in backend.durations[1:] if _scales(impacts) else backend.durations:
+        longer = backend.lengthened(factor)
+        columns = longer.outcomes(corners, judged=False).columns
+        is_over = (columns[About.STATUS] == Status.OK) & np.isfinite(columns[PEAK_FORCE])
+        if is_over.all():
+            break
+    return longer
+
+
+def _swept(plate: PagePlate, impacts: Impacts) -> Swept:
+    """Return the projectile and the law of impacts, whose values the page gives."""
     rod, none = impacts.kinds[0], np.empty((0, 0))
     step = WilsonStep(rod.stiffness(), rod.mass(), plate.dt, rigid=rod.rigid)
     modes = ProjectileModes.of(rod.stiffness(), rod.mass(), rod.rigid)
     law = kernel_law(impacts.constants)
-    taken = sweep_structure(
-        plate.response,
-        plate.mobility * plate.dt**2,
-        Swept(modes, step, law.kind, none, np.empty((1, plate.steps)), none),
-    ).held
-    kept = {name: value for name, value in taken.items() if name not in ("given", "force", "found")}
-    return {
-        "structure": {
-            name: encoded(value) if isinstance(value, np.ndarray) else value
-            for name, value in kept.items()
-        },
-        "nodeMass": plate.node_mass,
-        "mobility": plate.mobility,
-    }
+    return Swept(modes, step, law.kind, none, np.empty((1, plate.steps)), none)
+
+
+# Arrays of a call, which the page allocates.
+OF_CALL = ("given", "force", "found")
+
+
+def _encoded(structure: Structure) -> list[list[Any]]:
+    """Return the fields of a structure: name, kind, offset, and value; None for missing arrays."""
+    values = {name: value for name, value in structure.held.items() if name not in OF_CALL}
+    return [
+        [*field, encoded(value) if isinstance(value, np.ndarray) else value]
+        for field in wasm_fields(type(structure))
+        for value in [values.get(field.name)]
+    ]
 
 
 def encoded(values: Floats) -> str:
@@ -122,49 +300,54 @@ def _strike(problem: Problem, impacts: Impacts) -> dict[str, Any]:
     with suppress(CasesError):
         unit_k = set_radius(strike_of(problem.deck), 1.0).law.k
     return {
-        "strike": {
-            "velocity": float(impacts.velocity[0]),
-            "mass": float(impacts.mass[0]),
-            "unitMass": float(impacts.mass[0] / impacts.scale[0]),
-            "scales": _scales(impacts),
-            "k": float(impacts.constants.k[0]),
-            "q": float(np.ravel(impacts.constants.q)[0]),
-            "critical": float(np.ravel(law.critical)[0]),
-            "slope": float(np.ravel(law.slope)[0]),
-            "unitK": unit_k,
-            "factor": impacts.factor,
-        }
+        "velocity": float(impacts.velocity[0]),
+        "mass": float(impacts.mass[0]),
+        "unitMass": float(impacts.mass[0] / impacts.scale[0]),
+        "scales": _scales(impacts),
+        "k": float(impacts.constants.k[0]),
+        "q": float(np.ravel(impacts.constants.q)[0]),
+        "critical": float(np.ravel(law.critical)[0]),
+        "slope": float(np.ravel(law.slope)[0]),
+        "unitK": unit_k,
+        "factor": impacts.factor,
     }
 
 
-def _judged(problem: Problem) -> dict[str, Any]:
-    """Return scales and limits of the plate, in the words of their rows."""
-    judge, threshold = problem.judge, problem.threshold
-    bounds = {"deflection": judge.deflection, "indentation": INDENTATION}
-    delaminates: Mapping[str, Any] | None = None
-    if threshold is not None:
-        card = strike_of(problem.deck).delamination
-        assert card is not None  # the deck has a threshold
-        delaminates = {
-            "force": threshold.force,
-            "toughness": card.toughness,
-            "band": threshold.band,
-            "from": from_threshold(threshold.number),
-        }
+def _threshold(problem: Problem) -> dict[str, Any] | None:
+    """Return the delamination threshold of the plate; None without one."""
+    threshold, card = problem.threshold, strike_of(problem.deck).delamination
+    if threshold is None or card is None:
+        return None
     return {
-        "thickness": judge.thickness,
-        "indented": judge.indented,
-        "mass": judge.plate_mass,
-        "limits": {
-            name: {
-                "quantity": limit.quantity,
-                "most": judge.largest(limit),
-                "level": limit.level,
-                "words": limit.page,
-            }
-            for name, limit in bounds.items()
-        },
-        "crossed": THRESHOLD.value,
-        "softness": [(round(float(ratio), 2), judge.softness(ratio)) for ratio in RATIOS],
-        "threshold": delaminates,
+        "force": threshold.force,
+        "toughness": card.toughness,
+        "band": threshold.band,
+        "from": from_threshold(threshold.number),
+    }
+
+
+def _bound(limit: ModelLimit, of: str, most: float) -> dict[str, Any]:
+    """Return a limit of a quantity of the page."""
+    return {
+        "quantity": limit.quantity,
+        "of": of,
+        "most": most,
+        "level": limit.level,
+        "words": limit.page,
+    }
+
+
+def _bounds(problem: Problem) -> Iterator[dict[str, Any]]:
+    """Yield the limits of all kinds of plates, in the words of their rows."""
+    judge = problem.judge
+    indentation = float(judge.largest(INDENTATION))
+    yield _bound(INDENTATION, "deepest", indentation) | {
+        "unit": "thickness",
+        "scale": judge.indented,
+    }
+    yield _bound(THRESHOLD, "overThreshold", THRESHOLD.value)
+    yield _bound(ITERATION, "unconverged", 0.0)
+    yield _bound(ENERGY_BALANCE, "balance", ENERGY_BALANCE.value) | {
+        "unit": "percent",
+        "scale": 0.01,
     }

@@ -130,6 +130,7 @@ class BendingModes:
     modes: int
     history: bool = True
     longer_than: BendingModes | None = None  # the same plate in the program of the deck
+    has_fields: bool = True  # without displacement fields, no outcome can be judged
     computes_together = False  # a search would try velocities far beyond the model
 
     @property
@@ -147,7 +148,7 @@ class BendingModes:
         """Impacts on the reduced plate; CasesError if it can't be reduced."""
         if self.longer_than is not None:
             return impacts_on(self.longer_than.plate.plate, self.problem)
-        return reduced(self.problem, self.modes)
+        return reduced(self.problem, self.modes, has_fields=self.has_fields)
 
     @cached_property
     def recovery(self) -> Recovery:

@@ -152,12 +152,12 @@ class ReducedImpacts:
         )
 
 
-def reduced(checked: Problem, modes: int) -> ReducedImpacts:
+def reduced(checked: Problem, modes: int, *, has_fields: bool = True) -> ReducedImpacts:
     """Return impacts on the plate of a problem, reduced to bending modes.
 
     Raises CasesError if that is not possible.
     """
-    return impacts_on(reduced_to(checked, modes), checked)
+    return impacts_on(reduced_to(checked, modes, has_fields=has_fields), checked)
 
 
 def impacts_on(plate: ReducedPlate, checked: Problem) -> ReducedImpacts:
@@ -167,7 +167,7 @@ def impacts_on(plate: ReducedPlate, checked: Problem) -> ReducedImpacts:
     return ReducedImpacts(plate, duration / steps, steps)
 
 
-def reduced_to(checked: Problem, modes: int) -> ReducedPlate:
+def reduced_to(checked: Problem, modes: int, *, has_fields: bool = True) -> ReducedPlate:
     """Reduce the plate of a problem to bending modes.
 
     Raises CasesError if that is not possible.
@@ -175,7 +175,7 @@ def reduced_to(checked: Problem, modes: int) -> ReducedPlate:
     assert checked.contact is not None  # the program has impact steps
     try:
         return reduced_plate(
-            checked.plate, checked.contact, modes, checked.damping, has_fields=True
+            checked.plate, checked.contact, modes, checked.damping, has_fields=has_fields
         )
     except ReductionError as error:
         raise CasesError(str(error)) from None

@@ -11,7 +11,14 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import ContactParameters, LinearPermanent, YangSunPermanent
 from fecm.mechanics.impact_steps import kernel_law
-from fecm.mechanics.impact_sweep import Given, ResultRow, SweepStruct, Swept, sweep_structure
+from fecm.mechanics.impact_sweep import (
+    Given,
+    ReducedStruct,
+    ResultRow,
+    Swept,
+    sweep_structure,
+)
+from fecm.mechanics.kernels import Structure
 from fecm.mechanics.kernels.webassembly import PATH, wasm_fields
 from fecm.mechanics.projectile import RigidMass, WilsonStep
 from fecm.mechanics.rod_modes import ProjectileModes
@@ -36,34 +43,57 @@ class WasmKernel:
         self._exports["_initialize"](self._store)
 
     def sweep_linear(self, response: Floats, rigid: float, swept: Swept) -> None:
-        """Compute impacts, as :func:`fecm.mechanics.impact_sweep.sweep_linear` does.
+        """Compute impacts, as :func:`fecm.mechanics.impact_sweep.sweep_linear` does."""
+        self._call("fecm_sweep", swept, response, rigid)
 
-        The arrays of `swept` are whole, not columns of larger ones.
+    def sweep_reduced(self, plate: ReducedStruct, swept: Swept) -> None:
+        """Compute impacts, as :func:`fecm.mechanics.impact_sweep.sweep_reduced` does.
+
+        The coordinates of the plate are not stored.
         """
-        given = np.ascontiguousarray(swept.given)
-        values = sweep_structure(response, rigid, swept._replace(given=given)).held
-        values |= {"given": given, "found": swept.found, "stride": given.shape[1]}
-        memory = self._exports["memory"]
+        self._call("fecm_reduced", swept, np.empty(0), 0.0, plate)
+
+    def _call(
+        self, function: str, swept: Swept, response: Floats, rigid: float, *more: Structure
+    ) -> None:
+        """Call a function with impacts, whose `force` and `found` it writes, and more structures.
+
+        Raises MemoryError.
+        """
+        given, found = (np.ascontiguousarray(rows) for rows in (swept.given, swept.found))
+        impacts = sweep_structure(response, rigid, swept._replace(given=given, found=found))
+        impacts.held |= {"given": given, "found": found}
+        places: list[dict[str, int]] = []
+        addresses = []
+        for structure in (impacts, *more):
+            packed, of_arrays = self._copied(structure)
+            places.append(of_arrays)
+            addresses.append(self._allocated(packed))
+        if not self._exports[function](self._store, *addresses):
+            raise MemoryError
+        for array, name in ((swept.force, "force"), (swept.found, "found")):
+            start = places[0][name]
+            stored = self._exports["memory"].read(self._store, start, start + array.nbytes)
+            array[:] = np.frombuffer(stored).reshape(array.shape)
+        self._free([*addresses, *(place for part in places for place in part.values())])
+
+    def _copied(self, structure: Structure) -> tuple[bytes, dict[str, int]]:
+        """Copy the arrays of a structure; return its bytes, and the addresses of the arrays."""
         places = {
             name: self._allocated(np.ascontiguousarray(value).tobytes())
-            for name, value in values.items()
+            for name, value in structure.held.items()
             if isinstance(value, np.ndarray)
         }
         packed = bytearray(SPACE)
-        for name, kind, offset in wasm_fields(SweepStruct):
+        for name, kind, offset in wasm_fields(type(structure)):
             form = {"int64": "<q", "double": "<d", "pointer": "<I"}[kind]
-            struct.pack_into(form, packed, offset, places.get(name, values[name]))
-        at = self._allocated(bytes(packed))
-        if not self._exports["fecm_sweep"](self._store, at):
-            raise MemoryError
-        for array, name in ((swept.force, "force"), (swept.found, "found")):
-            stored = memory.read(self._store, places[name], places[name] + array.nbytes)
-            array[:] = np.frombuffer(stored).reshape(array.shape)
-        self._free([*places.values(), at])
+            value = places.get(name, structure.held.get(name, 0))
+            struct.pack_into(form, packed, offset, value)
+        return bytes(packed), places
 
     def _allocated(self, data: bytes) -> int:
         """Return the address of a copy of some bytes."""
-        at: int = self._exports["malloc"](self._store, len(data))
+        at: int = self._exports["malloc"](self._store, max(len(data), 8))
         if not at:
             raise MemoryError
         self._exports["memory"].write(self._store, data, at)

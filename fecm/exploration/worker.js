@@ -1,0 +1,245 @@
+"use strict";
+// Worker of the page: the kernel of the package, compiled to WebAssembly, computes every contact force; this file
+// hands it the values and takes numbers from its forces.  A message has the impact of the sliders; the answers are
+// the impact, then the threshold energy, the curve over energies and the random impacts.  A new message ends the
+// work for the one before.  All values are in the deck's units.
+const LANES = 8; // cases that the kernel computes in the time of one
+const CURVE = 40, SLICE = 12; // points, ms of work between two messages
+
+let data, kernel, job = null, timer = false;
+
+const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
+
+// Kernel --------------------------------------------------------------------------------------------------------
+
+/** The kernel with the memory of one plate. */
+class Kernel {
+  constructor(module) {
+    this.exports = new WebAssembly.Instance(module, {}).exports;
+    this.exports._initialize();
+    this.places = [];
+  }
+
+  /** Address of a copy of an array in the memory. */
+  put(array) {
+    const at = this.exports.malloc(Math.max(array.byteLength, 8));
+    if (!at) throw new Error("there is not enough memory");
+    this.places.push(at);
+    new Uint8Array(this.exports.memory.buffer, at).set(new Uint8Array(array.buffer));
+    return at;
+  }
+
+  /** Put a plate into the memory, in place of the last one. */
+  load(plate) {
+    this.places.forEach(this.exports.free);
+    this.places = [];
+    this.plate = plate;
+    this.enough = Math.ceil(plate.steps / 4);
+    this.at = {given: this.put(new Float64Array(data.given.length * LANES)),
+               found: this.put(new Float64Array(data.found.length * LANES)),
+               force: this.put(new Float64Array(plate.steps * LANES))};
+    const own = {...this.at, stride: LANES};
+    this.structures = plate.structures.map(fields => {
+      const values = fields.map(([name, kind, , value]) =>
+        name in own ? own[name] : kind === "pointer" ? value && this.put(bytes(value)) : value);
+      const view = new DataView(new ArrayBuffer(512));
+      fields.forEach(([, kind, offset], n) => {
+        if (kind === "pointer") view.setUint32(offset, values[n] ?? 0, true);
+        else if (kind === "double") view.setFloat64(offset, values[n], true);
+        else view.setBigInt64(offset, BigInt(values[n]), true);
+      });
+      return this.put(view);
+    });
+  }
+
+  doubles(at, count) { return new Float64Array(this.exports.memory.buffer, at, count); }
+
+  /** Compute up to LANES impacts, and give the summary of each. */
+  run(impacts, steps) {
+    const {plate} = this, {strike} = plate;
+    const rows = {K: i => i.k, Q: () => strike.q, CRITICAL: () => strike.critical, SLOPE: () => strike.slope,
+                  VELOCITY: i => i.velocity, FACTOR: i => i.mass / strike.unitMass};
+    const given = this.doubles(this.at.given, data.given.length * LANES);
+    data.given.forEach((name, row) => impacts.forEach((impact, lane) => { given[row * LANES + lane] = rows[name](impact); }));
+    const sizes = {cases: impacts.length, steps}, view = new DataView(this.exports.memory.buffer, this.structures[0]);
+    for (const [name, , offset] of plate.structures[0]) if (name in sizes) view.setBigInt64(offset, BigInt(sizes[name]), true);
+    if (!this.exports[plate.function](...this.structures)) throw new Error("there is not enough memory");
+    const force = this.doubles(this.at.force, steps * impacts.length), found = this.doubles(this.at.found, data.found.length * LANES);
+    return impacts.map((impact, lane) => summary(plate, impact, force.subarray(lane * steps, (lane + 1) * steps),
+      Object.fromEntries(data.found.map((name, row) => [name, found[row * LANES + lane]]))));
+  }
+
+  /** Compute an impact in as few steps as are likely to decide it, and in all if these do not. */
+  one(impact) {
+    const {steps} = this.plate;
+    let [result] = this.run([impact], Math.min(steps, this.enough));
+    if (!isDecided(result)) [result] = this.run([impact], steps);
+    this.enough = Math.ceil(1.15 * result.contactEnd / this.plate.dt) + LANES;
+    return {...result, force: result.force.slice()};
+  }
+
+  /** Compute impacts whose peaks are wanted, in a short run, and those that it leaves open in a long one. */
+  peaks(impacts, steps) {
+    const results = this.run(impacts, steps);
+    const open = steps < this.plate.steps ? results.flatMap((result, row) => isNaN(result.peak_force) ? [row] : []) : [];
+    if (open.length)
+      this.run(open.map(row => impacts[row]), this.plate.steps).forEach((result, index) => { results[open[index]] = result; });
+    return results;
+  }
+}
+
+// Numbers of an impact ------------------------------------------------------------------------------------------
+
+const energyOf = (plate, {mass, velocity}) => 0.5 * plate.strike.factor * mass * velocity ** 2;
+const isDecided = result => result.over && !isNaN(result.max_deflection);
+
+/** What fecm/results/metrics.py takes from the forces of a case; NaN where its end has not decided a value. */
+function summary(plate, impact, force, found) {
+  const {mass, velocity} = impact, {factor} = plate.strike, {dt} = plate, steps = force.length, end = steps * dt;
+  let impulse = 0, lever = 0, peak = 0, peakAt = 0, touching = 0, contacts = 0, lastAt = -1, begin = 0;
+  for (let n = 0; n < steps; n++) {
+    const f = force[n];
+    if (!(f > 0)) continue;
+    const weight = n + 1 < steps ? dt : 0.5 * dt;
+    impulse += weight * f;
+    lever += weight * f * (steps - 1 - n) * dt;
+    touching++;
+    if (lastAt !== n - 1 || n === 0) { contacts++; begin = n; }
+    lastAt = n;
+    if (f > peak) { peak = f; peakAt = n; }
+  }
+  const last = force[steps - 1], rebound = impulse / mass - velocity;
+  let present = 0;
+  if (last > 0) for (let n = begin; n < steps; n++) present = Math.max(present, force[n]);
+  const motion = {last, peak, present, leaving: rebound + plate.mobility * impulse, ratio: mass / plate.mass,
+                  position: velocity * end - lever * (1 / mass + plate.mobility), speed: found.LARGEST_DW / dt};
+  const held = plate.mobility === 0, reach = Math.sqrt(2 * data.ends.rules.RESERVE * found.COMPLIANCE * Math.max(found.BENT_WORK, 0));
+  const state = endOf(motion, held, reach), over = state === "contact over", known = over || data.ends.words[state][0] !== "outside the model";
+  const where = (mask, value) => mask ? value : NaN;
+  const limit = plate.threshold ? plate.threshold.force * Math.sqrt(impact.giic / plate.threshold.toughness) : NaN;
+  const settled = over && (!held || reach <= data.ends.rules.RINGING * found.HIGHEST);
+  const lost = found.LOST + plate.nodeMass * found.LARGEST_DDW ** 2 / (8 * dt * dt);
+  return {
+    impact, force, dt, end: state, over, reached: factor * peak, limit, contactEnd: (lastAt + 1) * dt,
+    energy: energyOf(plate, impact), overThreshold: factor * peak / limit, unconverged: found.UNCONVERGED || NaN,
+    balance: found.INITIAL > 0 ? lost / found.INITIAL : lost, deepest: found.DEEPEST, highest: where(held, found.HIGHEST),
+    peak_force: where(known, factor * peak), time_of_peak: where(known && touching, (peakAt + 1) * dt),
+    contacts: where(over, contacts), contact_time: where(over, touching * dt),
+    max_deflection: where(settled, found.HIGHEST),
+    max_indentation: where(over || (known && found.INDENTATION < found.DEEPEST), found.DEEPEST),
+    permanent_indentation: where(over, found.PERMANENT), impulse: where(over, factor * impulse),
+    rebound_velocity: where(over, rebound), energy_absorbed: where(over, factor * 0.5 * mass * (velocity ** 2 - rebound ** 2)),
+    contact_loop: where(over, factor * found.CONTACT_WORK),
+  };
+}
+
+/** State of the contact at the end of a case, as fecm/judge/end.py decides it. */
+function endOf(m, held, reach) {
+  const {CLEAR, CLEAR_FREE, PRESSED, LIGHT, FALLEN, GONE} = data.ends.rules;
+  const clear = (held ? CLEAR : CLEAR_FREE) + PRESSED * (m.last > 0 ? m.last / m.peak : 0);
+  const isClear = m.leaving > clear * m.speed || (m.leaving > 0 && m.ratio < LIGHT);
+  if (m.last > 0)
+    return isClear && m.last < FALLEN * Math.min(m.present, m.peak) ? "in contact, peak passed" : "in contact, peak not reached";
+  if (m.leaving < 0) return "between contacts";
+  const near = m.leaving <= GONE * m.speed && !(m.position < -reach);
+  return near ? (isClear ? "peak passed, may touch again" : "may touch again") : "contact over";
+}
+
+// Work ----------------------------------------------------------------------------------------------------------
+
+let known = ""; // what the last threshold energy and curve belong to
+
+/** Answer a message: each yield is a moment for the next one. */
+function* work({number, plate: row, impact, scatter}) {
+  const plate = data.plates[row], say = parts => postMessage({number, ...parts}), {mass, k, giic} = impact;
+  if (kernel.plate !== plate) kernel.load(plate);
+  const now = kernel.one(impact), steps = Math.min(plate.steps, kernel.enough);
+  say({now});
+  yield;
+  const energy = velocity => energyOf(plate, {mass, velocity}), speed = value => Math.sqrt(2 * value / plate.strike.factor / mass);
+  const many = function* (impacts) {
+    const results = [];
+    for (let n = 0; n < impacts.length; n += LANES) {
+      results.push(...kernel.peaks(impacts.slice(n, n + LANES), steps).map(({reached, peak_force}) => ({reached, peak_force})));
+      yield;
+    }
+    return results;
+  };
+  const widest = Math.max(data.spans.energy[1] * energyOf(plate, plate.strike), now.energy), key = [row, mass, k, giic, widest].join();
+  if (key !== known) {
+    const found = now.limit > 0 ? energy(yield* searched(impact, plate, now.limit, many)) : null;
+    say({found});
+    const most = 1.04 * Math.max(widest, found < 4 * widest ? 1.3 * found : 0);
+    const energies = Array.from({length: CURVE}, (_, n) => most * (n + 1) / CURVE);
+    const peaks = yield* many(energies.map(value => ({...impact, velocity: speed(value)})));
+    say({curve: {energies: [0, ...energies], peaks: [0, ...peaks.map(one => one.reached)], most}});
+    known = key;
+  }
+  say({draws: now.limit > 0 && Object.values(scatter).some(size => size > 0) ? yield* drawn(impact, plate, scatter, many) : null});
+  // The page goes on for longer than the program of the deck, where the impact does.
+  const inDeck = Math.round(plate.program / plate.dt);
+  say({extended: inDeck < plate.steps && !isDecided(kernel.run([impact], inDeck)[0]), done: true});
+}
+
+/** Lowest velocity near that of the deck at which the peak of an impact reaches a force, as a sweep searches it. */
+function* searched(impact, {strike, search: [count, span]}, force, many) {
+  let trials = Array.from({length: count}, (_, n) => strike.velocity * span ** (2 * n / (count - 1) - 1));
+  for (let round = 0; round < 12; round++) {
+    const peaks = (yield* many(trials.map(velocity => ({...impact, velocity})))).map(one => one.reached);
+    const after = peaks.findIndex(peak => peak >= force);
+    if (after < 1) return NaN;
+    const low = trials[after - 1], high = trials[after], width = high - low;
+    if (width <= 1e-6 * high) return high;
+    const share = Math.log(force / peaks[after - 1]) / Math.log(peaks[after] / peaks[after - 1]);
+    const guess = low * (high / low) ** (share > 0 && share < 1 ? share : 0.5);
+    const inside = [0.01, 1e-4, 1e-7].flatMap(part => [guess - part * width, guess + part * width]);
+    trials = [low, ...inside.filter(value => value > low && value < high), high].sort((a, b) => a - b);
+  }
+  return trials.at(-1);
+}
+
+/** Random impacts: their forces over the threshold, and how many are open. */
+function* drawn(impact, plate, scatter, many) {
+  const normal = normals(1), spread = (value, size) => value * Math.exp(0.01 * size * normal());
+  const impacts = Array.from({length: plate.draws}, () => ({
+    ...impact, velocity: impact.velocity * Math.sqrt(spread(1, scatter.energy)), k: spread(impact.k, scatter.k), giic: spread(impact.giic, scatter.giic)}));
+  // G_IIc does not change the force.
+  const results = yield* many(scatter.energy || scatter.k ? impacts : [impact]);
+  const limits = impacts.map(({giic}) => plate.threshold.force * Math.sqrt(giic / plate.threshold.toughness));
+  const ratios = limits.map((limit, n) => results[n % results.length].reached / limit);
+  return {ratios, open: ratios.filter((ratio, n) => ratio < 1 && isNaN(results[n % results.length].peak_force)).length};
+}
+
+/** Generator of standard normal numbers: the same for every state, so that a chance changes smoothly. */
+function normals(seed) {
+  let a = seed;
+  const uniform = () => {
+    a = (a + 0x6d2b79f5) | 0;
+    let t = Math.imul(a ^ (a >>> 15), 1 | a);
+    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
+    return ((t ^ (t >>> 14)) >>> 0) / 4294967296;
+  };
+  return () => Math.sqrt(-2 * Math.log(1 - uniform())) * Math.cos(2 * Math.PI * uniform());
+}
+
+function slice() {
+  timer = false;
+  const begin = performance.now();
+  while (job && performance.now() - begin < SLICE) if (job.next().done) job = null;
+  next();
+}
+
+function next() {
+  if (!job || timer) return;
+  timer = true;
+  setTimeout(slice);
+}
+
+/** The first message has the data of the page, its kernel, and the impacts of pinned curves. */
+onmessage = ({data: message}) => {
+  if (message.kernel) {
+    ({data} = message);
+    kernel = new Kernel(new WebAssembly.Module(bytes(message.kernel)));
+    postMessage({pins: message.pins.map(({plate, impact}) => { kernel.load(data.plates[plate]); return kernel.one(impact); })});
+  } else { job = work(message); next(); }
+};
