@@ -156,13 +156,15 @@ class Exploration:
     def html(self) -> str:
         """The page."""
         result = run_quietly(self._problem.deck)  # the page has its notes
-        plates = list(page_plates(self._kind, self._plan.settings, self._plan.cases, result))
-        size = len(json.dumps(plates))
-        if size > MOST:
-            raise ExploreError(
-                f"the responses of {len(plates)} plates take {size / 1e6:.3g} MB, and a page has "
-                f"at most {MOST / 1e6:g} MB: leave out values of `vary`, or shorten the run"
-            )
+        plates, size, cases = [], 0, self._plan.cases
+        for plate in page_plates(self._kind, self._plan.settings, cases, result):
+            plates.append(plate)
+            size += len(json.dumps(plate))
+            if size > MOST:
+                raise ExploreError(
+                    f"{len(plates)} of {len(cases)} plates take {size / 1e6:.3g} MB, and a page "
+                    f"has at most {MOST / 1e6:g} MB: leave out values of `vary`, or shorten the run"
+                )
         deck, names = self._problem.deck, unit_names(self._problem.deck)
         units = {name: unit_of(dimension, names) for name, dimension in DIMENSIONS.items()}
         data = {

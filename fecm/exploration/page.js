@@ -91,7 +91,7 @@ function chart(svg, {x, y, lines = [], marks = [], level, bars = [], words}) {
       add("text", {class: "of-level", x: (left + width - right) / 2, y: low - 5, "text-anchor": "middle"}, "delamination of each interface");
     }
     add("path", {class: "level", d: `M${left} ${one(toY(level.value))}H${width - right}`});
-    add("text", {class: "of-level", x: width - right - 4, y: toY(level.value) - 5, "text-anchor": "end"}, level.label);
+    add("text", {class: "of-level", x: width - right - 4, y: toY(level.value) + (level.isBelow ? 14 : -5), "text-anchor": "end"}, level.label);
   }
   for (const line of lines) add("path", {class: line.kind, d: path(line, toX, toY, width)});
   for (const mark of marks) add("circle", {class: "mark", cx: one(toX(mark.x)), cy: one(toY(mark.y)), r: 6});
@@ -156,11 +156,11 @@ function sliders() {
     height: data.gravity ? spread(v * v / (2 * data.gravity), spans.energy) : null};
   list.push({group: "Impact", name: state.speed, label: {energy: "energy", velocity: "velocity", height: "height"}[state.speed], ends: of[state.speed]});
   if (first.strike.scales) list.push({group: "Impact", name: "mass", label: `mass${part}`, ends: spread(base.mass, spans.mass)});
-  list.push(state.law === "k" ? {group: "Contact", name: "k", label: `k${part}`, ends: spread(base.k, spans.k)}
+  list.push(state.law === "k" ? {group: "Contact", name: "k", label: `stiffness k${part}`, ends: spread(base.k, spans.k)}
     : {group: "Contact", name: "radius", label: "radius", ends: spread((base.k / first.strike.unitK) ** 2, spans.k, 1)});
   if (base.giic !== null) {
-    list.push({group: "Laminate", name: "giic", label: "G_IIc", ends: spread(base.giic, spans.giic)});
-    for (const [name, label] of [["energy", "energy"], ["k", "k"], ["giic", "G_IIc"]])
+    list.push({group: "Laminate", name: "giic", label: "toughness G_IIc", ends: spread(base.giic, spans.giic)});
+    for (const [name, label] of [["energy", "energy"], ["k", "k"], ["giic", "toughness G_IIc"]])
       list.push({group: "Scatter (standard deviations)", name, label, ends: [0, 40], scatter: true});
   }
   return list;
@@ -287,14 +287,14 @@ function draw() {
   if (shown.curve) {
     const {energies, peaks, most} = shown.curve, top = Math.max(...peaks);
     chart(byId("curve"), {x: {name: "energy", label: "energy", most: Math.max(most, energy)}, y: {name: "peak_force", label: "peak force", most: 1.1 * (level && level.value < 2 * top ? Math.max(top, level.value) : top)},
-      lines: [{kind: "now", x: n => energies[n], y: peaks}], marks: [{x: energy, y: now.reached}], level,
+      lines: [{kind: "now", x: n => energies[n], y: peaks}], marks: [{x: energy, y: now.reached}], level: level && {...level, isBelow: true},
       words: `Peak force against energy; the impact has ${quantity("energy", energy)}${found ? `, the threshold is reached at ${quantity("energy", found)}` : ""}`});
   }
-  byId("chance").hidden = !(now.limit > 0);
+  for (const part of document.querySelectorAll(".delamination")) part.hidden = !(now.limit > 0);
   if (shown.draws) histogram(shown.draws, chance);
   else {
     byId("draws").replaceChildren();
-    byId("probability").textContent = Object.values(state.scatter).some(size => size > 0) ? "being computed" : "Give the energy, k or G_IIc a scatter to see how sure the answer is.";
+    byId("probability").textContent = Object.values(state.scatter).some(size => size > 0) ? "being computed" : "Give the energy, k or the toughness a scatter to see how sure the answer is.";
   }
   table(byId("trust"), ["quantity", "size", "verdict", "why"], rows.map(one => [one.quantity, one.size, element("span", {class: `mark ${tag(one.level)}`}, one.level), one.words]));
   table(byId("numbers"), ["quantity", "now", ...pins.map((_, n) => `pinned ${n + 1}`)],

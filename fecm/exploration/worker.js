@@ -6,7 +6,8 @@
 const LANES = 8; // cases that the kernel computes in the time of one
 const CURVE = 40, SLICE = 12; // points, ms of work between two messages
 
-let data, kernel, job = null, timer = false;
+const turns = new MessageChannel();
+let data, kernel, job = null, isPlanned = false;
 
 const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
 
@@ -175,10 +176,10 @@ function* work({number, plate: row, impact, scatter}) {
     say({curve: {energies: [0, ...energies], peaks: [0, ...peaks.map(one => one.reached)], most}});
     known = key;
   }
-  say({draws: now.limit > 0 && Object.values(scatter).some(size => size > 0) ? yield* drawn(impact, plate, scatter, many) : null});
+  const draws = now.limit > 0 && Object.values(scatter).some(size => size > 0) ? yield* drawn(impact, plate, scatter, many) : null;
   // The page goes on for longer than the program of the deck, where the impact does.
   const inDeck = Math.round(plate.program / plate.dt);
-  say({extended: inDeck < plate.steps && !isDecided(kernel.run([impact], inDeck)[0]), done: true});
+  say({draws, extended: inDeck < plate.steps && !isDecided(kernel.run([impact], inDeck)[0]), done: true});
 }
 
 /** Lowest velocity near that of the deck at which the peak of an impact reaches a force, as a sweep searches it. */
@@ -222,17 +223,17 @@ function normals(seed) {
   return () => Math.sqrt(-2 * Math.log(1 - uniform())) * Math.cos(2 * Math.PI * uniform());
 }
 
+/** Do a part of the work; a message in between may replace the rest. */
 function slice() {
-  timer = false;
+  isPlanned = false;
   const begin = performance.now();
   while (job && performance.now() - begin < SLICE) if (job.next().done) job = null;
   next();
 }
 
 function next() {
-  if (!job || timer) return;
-  timer = true;
-  setTimeout(slice);
+  if (job && !isPlanned) turns.port2.postMessage(null); // a timer would wait for 4 ms
+  isPlanned = job !== null;
 }
 
 /** The first message has the data of the page, its kernel, and the impacts of pinned curves. */
@@ -243,3 +244,4 @@ onmessage = ({data: message}) => {
     postMessage({pins: message.pins.map(({plate, impact}) => { kernel.load(data.plates[plate]); return kernel.one(impact); })});
   } else { job = work(message); next(); }
 };
+turns.port1.onmessage = slice;
