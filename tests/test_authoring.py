@@ -46,6 +46,7 @@ REPORT = [
     "--layup", "[0/45/0/-45/0]2s", "--ply-thickness", ".0053", "--material", "report",
     "--velocity", "115", "--law", "1912000,.0006564,.094,2.0",
     "--duration", "800e-6", "--dt", "2e-7", "--every", "20", "--patch", "none", "--shear", "full",
+    "--precision", "double",
 ]  # fmt: skip
 PLATE = [
     "--size", "0.3x0.2", "--mesh", "6x4", "--layup", "[0/90]s", "--ply-thickness", "0.25e-3",

@@ -12,6 +12,7 @@ from fecm import Ply
 from fecm.deck.model import (
     Allowables,
     Boundary,
+    Compact,
     Control,
     Coordinates,
     Cure,
@@ -131,6 +132,7 @@ def decks(draw: st.DrawFn) -> Deck:
                 st.builds(Impact, counts, counts, numbers),
                 st.builds(Indentation, *[numbers] * 4),
                 st.builds(Nonlinear),
+                st.builds(Compact),
                 st.builds(Preload, *[numbers] * 3),
                 st.builds(Curvature, *[numbers] * 3),
                 st.builds(

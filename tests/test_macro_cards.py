@@ -13,6 +13,7 @@ from fecm.deck.format import format_deck
 from fecm.deck.macros import WORDS, estimate_work
 from fecm.deck.model import (
     Allowables,
+    Compact,
     Cure,
     Curvature,
     Expansion,
@@ -235,6 +236,7 @@ STRENGTHS = replace(
         Projectile(0, 0, 1e-4),
         Indentation(30000.0, 0.01, 0.0, 2.5, "ACR"),
         Nonlinear(),
+        Compact(),
         Preload(50.0),
         Springs((NodeValues(1, 2, (0.0, 0.0, 1e5, 0.0, 1 / 3)), NodeValues(9, 0, (0.0,) * 5))),
         Springs((NodeValues(1, 5, (0.0, 0.0, 1e5, 0.0, 0.0)),), word="LINE"),

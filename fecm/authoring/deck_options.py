@@ -34,6 +34,7 @@ Quadrature = Literal["mitc", "full"]  # treatment of transverse shear
 MITC: Quadrature = "mitc"
 FULL: Quadrature = "full"
 Kinematics = Literal["auto", "linear", "von-karman"]
+Precision = Literal["single", "double"]
 AUTO_KINEMATICS: Kinematics = "auto"  # the static estimate of the deflection decides
 LINEAR: Literal["linear"] = "linear"
 VON_KARMAN: Literal["von-karman"] = "von-karman"
@@ -223,7 +224,17 @@ class ImpactOptions(DeckOptions):
         metavar="T[UNIT]",
     )
     every: int | None = option(
-        None, "Steps between stored rows.", default_text="for about 200 rows", group="Numerics"
+        None,
+        "Steps between stored rows.",
+        default_text="for about 100 rows of displacements and 50 of strains",
+        group="Numerics",
+    )
+    precision: Precision = option(
+        "single",
+        "Precision of stored displacements, strains, stresses and exposures; single also "
+        "compresses the file (COMP).",
+        choices=get_args(Precision),
+        group="Numerics",
     )
     plies: int | bool | tuple[int, int] | None = option(
         None,
@@ -237,8 +248,8 @@ class ImpactOptions(DeckOptions):
         None,
         "Evaluate the failure criteria at every N-th step (ALLO, FAIL); needs a named ply with "
         "strengths.",
-        python="True evaluates them at the rows of `every`.",
-        default_text="with `damage` as `every`",
+        python="True evaluates them as by default.",
+        default_text="with `damage` as `every`, or about 200 times",
         group="Numerics",
         metavar="N",
     )

@@ -40,7 +40,10 @@ from fecm.problem.loading import load_deck
 from fecm.problem.parts import build_plate, has_assumed_shear
 from fecm.problem.problem import Problem
 
-ROWS = 200  # default number of stored rows of strains and displacements
+ROWS = 200  # default number of evaluations of the failure criteria
+# By default there is a row of displacements at every second evaluation, and a row of strains, which
+# take most of the file, at every fourth.
+EVERY = {"DISP": 2, "RODP": 4}
 
 # Elements around the load, which store ply stresses with `damage`. Their largest distance is a
 # multiple of the distance within which plate theory fails. There is also a least number of them.
@@ -98,11 +101,15 @@ def impact_program(
     `until_over` ends it once the impact is over, after at most EXTENDED times the duration.
     """
     steps = max(1, math.ceil(duration / dt - 1e-9))
-    rows = options.every if options.every is not None else max(1, steps // ROWS)
+    rows, every = max(1, steps // ROWS), EVERY
+    if options.every is not None:
+        rows, every = options.every, dict.fromkeys(EVERY, 1)
     words = {"LMAS": 0.0, "DT": dt, "LOOP": float(steps), "TIME": 0.0}
-    words |= {"RODP": float(rows), "DISP": float(rows), "NEXT": 0.0}
+    words |= {word: float(every[word] * rows) for word in ("RODP", "DISP")} | {"NEXT": 0.0}
     macros = [Macro(word, value=value) for word, value in words.items()]
     failure = deck.has(Allowables) if options.failure is None else options.failure
+    if failure is True:
+        failure = rows
     plies = options.plies
     if plies is None and elements is not None:
         plies = (steps_of_plies(steps, rows), elements)
@@ -121,6 +128,8 @@ def with_impact_program(
     With `damage` and strengths the program also stores ply stresses around the load.
     """
     deck = structure.deck
+    if options.precision == "single":
+        deck = replace(deck, segments=(*deck.segments, model.Compact()))
     with_plies = options.damage and deck.has(Allowables)
     elements, until_over = None, duration is None
     if duration is None or with_plies:

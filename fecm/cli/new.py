@@ -13,6 +13,7 @@ from click import option
 from click.core import ParameterSource
 
 from fecm._files import check_outputs
+from fecm._machine import format_bytes
 from fecm._text import printable
 from fecm.authoring.deck_options import AUTO, ImpactOptions
 from fecm.authoring.elastic_edges import FORM, SPRING
@@ -37,10 +38,13 @@ from fecm.cli.options import (
 )
 from fecm.deck.format import format_deck
 from fecm.deck.grid import SUPPORTS
-from fecm.deck.model import Deck, Indentation, Material, Nonlinear, Patch, Ply, Shear
+from fecm.deck.macros import EXTENDED
+from fecm.deck.model import Compact, Deck, Indentation, Material, Nonlinear, Patch, Ply, Shear
 from fecm.mechanics.points import DISC, RADIUS_PER_THICKNESS
 from fecm.problem.loading import load_deck
 from fecm.problem.plate_mesh import BOUNDARY
+from fecm.problem.problem import Problem
+from fecm.problem.summary import format_rows
 
 RECTANGLE = ("size", "grading", "columns", "rows")  # besides the mesh
 OF_FIXTURE = ("window", "clamps")  # options of a fixture
@@ -315,11 +319,20 @@ def new_command(
         echo_findings(errors, "the new deck")
         raise RefusedError("these options do not give a valid deck; nothing was written")
     note(*doubts)
-    inform(*notes, *_additions(authored.deck))
+    inform(*notes, *_additions(authored.deck), *map(_about_file, prepared.problems))
     echo_findings(prepared.findings, str(output) if to_file else "the new deck")
     write_text(output, text, overwrite=overwrite)
     if to_file:
         echo_path(output)
+
+
+def _about_file(problem: Problem) -> str:
+    """Return size and rows of the file of a run; OVER ends it after the expected time."""
+    share = 1.0 / EXTENDED if problem.work.at_most else 1.0
+    rows = {word: max(1, round(share * count)) for word, count in problem.stored_rows.items()}
+    before = " before compression" if problem.deck.has(Compact) else ""
+    size = format_bytes(round(share * problem.output_bytes))
+    return f"a run stores about {size}{before}: rows {format_rows(rows)}"
 
 
 def _additions(deck: Deck) -> list[str]:

@@ -42,7 +42,7 @@ from fecm.deck.mesh_cards import (
     NodeCodes,
     NodeValues,
 )
-from fecm.deck.output_cards import Gage, Gages, Page, PrintOption, Units
+from fecm.deck.output_cards import Compact, Gage, Gages, Page, PrintOption, Units
 from fecm.deck.segment import NumberedSegment, Segment
 from fecm.deck.support_cards import OneSidedSupport, OneSidedSupports, PointMasses, Springs
 from fecm.deck.zone_cards import (
@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from fecm.authoring.changes import Values
 
 __all__ = [
-    "Allowables", "Boundary", "Control", "Coordinates", "Cure", "Curvature", "Damping",
+    "Allowables", "Boundary", "Compact", "Control", "Coordinates", "Cure", "Curvature", "Damping",
     "Deck", "Delamination", "ElementNodes", "Elements", "Expansion", "Forces", "Gage", "Gages",
     "Impact", "Indentation", "Integration", "LaminateNumber", "Laminates", "Layer", "LoadTable",
     "Macro", "Material", "MaterialNumber", "Materials", "NodeCodes", "NodeValues", "Nonlinear",
@@ -100,6 +100,7 @@ SEGMENTS: dict[str, type[Segment]] = {
     "CURE": Cure,
     "GAGE": Gages,
     "UNIT": Units,
+    "COMP": Compact,
     "PRIN": PrintOption,
     "NOPR": PrintOption,
     "PAGE": Page,

@@ -1,4 +1,4 @@
-"""Cards of the output: strain gages, names of units, and the printer's options."""
+"""Cards of the output: strain gages, names of units, size of the file, the printer's options."""
 
 from __future__ import annotations
 
@@ -71,6 +71,20 @@ class Units(Segment, keyword="UNIT"):
         """Return the text of the segment's cards."""
         yield self.keyword
         yield f"{self.length} {self.force} {self.time}"
+
+
+@dataclass(frozen=True)
+class Compact(Segment, keyword="COMP"):
+    """COMP: fields in single precision, and a compressed file (not in the report's program)."""
+
+    @classmethod
+    def read(cls, head: Card, cards: CardStream) -> Self:
+        """Read the keyword card, the only card of the segment."""
+        return cls(source=CardSource(head))
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Return the text of the segment's card."""
+        yield self.keyword
 
 
 @dataclass(frozen=True)

@@ -508,21 +508,32 @@ class Problem:
             **{"nps": an_element, "npp": an_element, "layers": layers},
             "members": chosen or control.numel,
         }
+        field = 4 if self.deck.has(model.Compact) else 8  # bytes of a number of a field
         numbers = {
-            info.macro: work.passes[info.macro] * values_per_row(group, sizes)
+            info.macro: field * work.passes[info.macro] * values_per_row(group, sizes)
             for group, info in GROUPS.items()
             if info.by_pass
         }
         numbers["FAIL"] = (
-            min(1, work.passes["FAIL"]) * 9 * points * layers * 2  # both faces of a ply
-            + work.passes["FAIL"] * len(CRITERIA) * 5
+            # Exposure, time and mode of both faces of a ply.
+            min(1, work.passes["FAIL"]) * len(CRITERIA) * (2 * 8 + 1) * points * layers * 2
+            + 8 * work.passes["FAIL"] * len(CRITERIA) * 5
         )
         history = work.steps * (18 + gages + bool(self.damping))
-        numbers["RODP"] = work.contact_rows * (points * 5 + 8) + history
+        numbers["RODP"] = work.contact_rows * (field * points * 5 + 8 * 8) + 8 * history
         if self.deck.has(model.Nonlinear):
-            numbers["DISP"] += work.passes["DISP"] * MEMBRANE_VALUES
-            numbers["RODP"] += work.contact_rows * MEMBRANE_VALUES
-        return {word: 8 * count for word, count in numbers.items()}
+            numbers["DISP"] += 8 * work.passes["DISP"] * MEMBRANE_VALUES
+            numbers["RODP"] += 8 * work.contact_rows * MEMBRANE_VALUES
+        return numbers
+
+    @cached_property
+    def stored_rows(self) -> dict[str, int]:
+        """Number of rows of the result's large datasets, by the macro that stores them."""
+        work = self.work
+        rows = {"RODP": work.contact_rows} | {
+            word: work.passes[word] for word in ("DISP", "STRE", "PLYS", "FAIL")
+        }
+        return {word: count for word, count in rows.items() if count}
 
     @property
     def output_bytes(self) -> int:

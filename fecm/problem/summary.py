@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,7 +16,7 @@ from fecm._table import Row, Table, titled_lines
 from fecm._text import significant
 from fecm._typing import FiniteFloat, Floats
 from fecm.deck.macros import flat
-from fecm.deck.model import Cure, Impact, Shear
+from fecm.deck.model import Compact, Cure, Impact, Shear
 from fecm.deck.units import MASS, MODULUS, mass_in_si, quantity, unit_names, unit_of
 from fecm.judge.threshold import from_threshold
 from fecm.mechanics.interpolation import W
@@ -119,7 +119,11 @@ class ProblemSummary:
     time_steps : tuple of float
         Every DT of the program; 0 takes 0.9 of the critical time step.
     output_bytes : int
-        Approximate size of the result.
+        Approximate size of the result, before compression.
+    rows : dict
+        Number of its rows by the macro that stores them.
+    compact : bool
+        Whether the result is compressed.
     at_most : bool
         Whether OVER may end the program earlier, so that steps and bytes are upper bounds.
     elements_per_wave : float or None
@@ -175,6 +179,8 @@ class ProblemSummary:
     elements_per_buckle: float | None
     time_steps: tuple[FiniteFloat, ...]
     output_bytes: int
+    rows: dict[str, int]
+    compact: bool
     at_most: bool
     elements_per_wave: FiniteFloat | None
     mesh_error: FiniteFloat | None
@@ -309,7 +315,24 @@ def _program_rows(summary: ProblemSummary) -> Iterator[Row]:
         yield ("elements per wave", f"{summary.elements_per_wave:.1f}{error}")
     at_most = "at most " if summary.at_most else ""
     yield ("impact steps", f"{at_most}{summary.steps}")
-    yield ("output", f"{at_most}{format_bytes(summary.output_bytes)}")
+    before = " before compression" if summary.compact else ""
+    yield ("output", f"{at_most}{format_bytes(summary.output_bytes)}{before}")
+    if summary.rows:
+        yield ("rows", f"{at_most}{format_rows(summary.rows)}")
+
+
+ROWS = {
+    "RODP": "strains",
+    "DISP": "displacements",
+    "STRE": "stress resultants",
+    "PLYS": "ply stresses",
+    "FAIL": "exposures",
+}
+
+
+def format_rows(rows: Mapping[str, int]) -> str:
+    """Return how many rows of what a run stores."""
+    return ", ".join(f"{count} of {ROWS[word]}" for word, count in rows.items())
 
 
 def _share_of_step(summary: ProblemSummary) -> str:
@@ -364,6 +387,8 @@ def deck_summary(problem: Problem) -> ProblemSummary:
         elements_per_buckle=problem.elements_per_buckle if plate.is_curved else None,
         time_steps=tuple(macro.value for macro in flat(problem.program) if macro.word == "DT"),
         output_bytes=problem.output_bytes,
+        rows=problem.stored_rows,
+        compact=deck.has(Compact),
         at_most=problem.work.at_most,
         elements_per_wave=None if resolved is None else resolved.elements,
         mesh_error=None if resolved is None else resolved.error,

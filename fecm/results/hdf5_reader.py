@@ -27,6 +27,7 @@ from fecm.results.exposures import AT_REST, LOAD_FACTOR
 from fecm.results.groups import NotStoredError, not_stored
 from fecm.results.metrics import INITIAL_PLATE, MOBILITY, REST_W, START_W
 from fecm.results.schema import FORMAT_VERSION, Form
+from fecm.results.sinks import doubles
 
 ELEMENTS = "mesh/elements"
 COORDINATES = "mesh/coordinates"
@@ -99,7 +100,7 @@ class FileContents(Mapping[str, Array]):
             return np.array(self.lists[key])
         if key not in self._read:
             with self._file() as file:
-                values = np.asarray(file[key][()])
+                values = doubles(np.asarray(file[key][()]))
             if key == ELEMENTS and values.size:  # plotting indexes nodes unchecked
                 count = self.shapes.get(COORDINATES, (0,))[0]
                 if not 0 <= values.min() <= values.max() <= count:
@@ -116,7 +117,7 @@ class FileContents(Mapping[str, Array]):
             return np.array(self.lists[path][start:stop], dtype=object)
         with self._file() as file:
             if self.shapes[path]:
-                return np.asarray(file[path][start:stop])
+                return doubles(np.asarray(file[path][start:stop]))
             return np.asarray(file[path][()]).reshape(1)[start:stop]
 
     def attributes_of(self, path: str) -> dict[str, Any]:
@@ -253,7 +254,7 @@ def _list(contents: FileContents, file_size: int, name: str, item: Any) -> None:
         contents.shapes[name], contents.dtypes[name] = shape, np.dtype(object)
     elif dtype.kind in "biuf" and shape is not None and not dtype.shape:
         contents.shapes[name] = tuple(map(int, shape))
-        contents.dtypes[name] = dtype.newbyteorder("=")
+        contents.dtypes[name] = doubles(np.empty(0, dtype.newbyteorder("="))).dtype
     else:
         references = h5py.check_ref_dtype(dtype) is not None
         what = "references; they are not followed" if references else "neither numbers nor a text"

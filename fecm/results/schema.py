@@ -77,6 +77,9 @@ NUMBERS = "numbers"  # integers or numbers
 TEXTS = "texts"
 
 
+FIELD_AXES = {"numnp", "numel", "members"}
+
+
 @dataclass(frozen=True)
 class Dataset:
     """Dataset of a result."""
@@ -101,6 +104,11 @@ class Dataset:
     def with_outer(self) -> "Dataset":
         """Return the dataset of a result that has the outer axis."""
         return replace(self, shape=(self.outer, *self.shape))
+
+    @property
+    def is_field(self) -> bool:
+        """Whether it has rows of numbers of nodes or elements, which COMP rounds."""
+        return self.dtype == "f8" and "rows" in self.shape and bool(FIELD_AXES & {*self.shape})
 
 
 EVERY_STEP = ("energy", "history", "gages")  # groups with a row for every step

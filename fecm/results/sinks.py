@@ -68,6 +68,11 @@ class MemorySink:
 Sink: TypeAlias = "MemorySink | FileSink"
 
 
+def doubles(values: Array) -> Array:
+    """Return numbers that a compact file has in single precision as double ones."""
+    return values.astype(np.float64) if values.dtype == np.float32 else values
+
+
 class ReadOnce(Mapping[str, Array]):
     """Datasets of a sink by path, for the result of a run that is about to end.
 
@@ -80,12 +85,12 @@ class ReadOnce(Mapping[str, Array]):
 
     def __getitem__(self, path: str) -> Array:
         if path not in self._read:
-            self._read[path] = np.asarray(self._datasets[path])
+            self._read[path] = doubles(np.asarray(self._datasets[path]))
         return self._read[path]
 
     def rows(self, path: str, start: int, stop: int) -> Array:
         """Return rows `start` to `stop` of a dataset."""
-        return np.asarray(self._read.get(path, self._datasets[path])[start:stop])
+        return doubles(np.asarray(self._read.get(path, self._datasets[path])[start:stop]))
 
     def __contains__(self, path: object) -> bool:
         return path in self._datasets  # Mapping's own method would read the dataset

@@ -19,6 +19,7 @@ from fecm._table import Row, html_summary
 from fecm._watch import LOGGER, SILENT, CallerWatch, Progress, StoppedError, Watch
 from fecm.deck.findings import Finding
 from fecm.deck.macros import EXTENDED, extended
+from fecm.deck.output_cards import Compact
 from fecm.listing.printout import Printer
 from fecm.listing.slips import MODES, NAMES, REPORT, Mode, active_slips
 from fecm.mechanics.contact_law import Law
@@ -505,6 +506,7 @@ class ProblemRun:
                 stack.enter_context(resuming(path))
             replaces = self.overwrite or self.resumes
             sink = stack.enter_context(result_writing(path, overwrite=replaces))
+            sink.compact = self.problem.deck.has(Compact)
             checkpointer = Checkpointer(path, sink, self.finished or ())
             printer = Printer()
             if self.printed is not None:

@@ -64,6 +64,7 @@ SINGLE: Kinds = (
     model.Patch,
     model.Gages,
     model.Units,
+    model.Compact,
     model.Allowables,
     model.Delamination,
     model.Damping,
