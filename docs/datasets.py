@@ -23,8 +23,8 @@ $ fecm info RESULT.h5
 [Results](results.md) explains what the datasets mean together. Names in a shape are sizes: `rows`
 is the number of rows of the group, `numnp` and `numel` count nodes and elements, `npt` and `nps`
 points of an element, `ndf` degrees of freedom of a node. `NAME` stands for any name. Numbers
-without a dimension are pure. A deck with [`COMP`](deck.md) stores rows of nodes and of elements in single
-precision.
+without a dimension are pure. A deck with [`COMP`](deck.md) stores rows of nodes and of elements
+in single precision.
 """
 TITLES = {Form.RUN: "Runs", Form.SWEEP: "Sweeps", Form.LOCATION: "Locations"}
 TABLE = ["| dataset | shape | dimension | what it is |", "|---|---|---|---|"]
