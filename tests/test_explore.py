@@ -137,6 +137,14 @@ def test_a_stretching_plate_says_how_far_its_modes_are_from_full_runs() -> None:
     assert re.findall(r"(\S+%) at", bound["words"])[0] == difference
 
 
+def test_the_command_says_that_a_stretching_plate_takes_full_runs(tmp_path: Path) -> None:
+    (tmp_path / "plate.inp").write_text(STRETCHING)
+    (tmp_path / "linear.inp").write_text(small())
+    said = call("explore", "plate.inp", cwd=tmp_path).stderr
+    assert "full runs of each plate" in said
+    assert "full runs" not in call("explore", "linear.inp", cwd=tmp_path).stderr
+
+
 def test_a_page_in_modes_that_do_not_give_the_peak_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

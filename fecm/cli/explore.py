@@ -9,7 +9,7 @@ import click
 from click import option
 
 from fecm.authoring.values import PLATE_NAMES
-from fecm.cli.common import RefusedError, echo_path
+from fecm.cli.common import RefusedError, echo_path, inform
 from fecm.cli.decks import refusing_errors
 from fecm.cli.options import (
     DECK_PATH,
@@ -68,6 +68,7 @@ def explore_command(
     check_page(path, overwrite, [deck, *filter(None, [options["overlay"]])])
     with refusing_errors("; no page was written"):
         page = Exploration(deck, **options)
+    inform(*filter(None, [page.price]))
     page.save(path, overwrite=overwrite)
     echo_path(path)
     if opens and click.launch(str(path)):

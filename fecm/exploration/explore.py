@@ -152,6 +152,11 @@ class Exploration:
         elif self.columns or self.units:
             raise ExploreError("columns and units describe a measured force: give overlay too")
 
+    @property
+    def price(self) -> str:
+        """What takes long before the page is written; empty if nothing does."""
+        return self._kind.price
+
     @cached_property
     def html(self) -> str:
         """The page."""

@@ -149,15 +149,15 @@ function choose(kind, choice) {
 
 /** Sliders of a group: name, label, and the values at their ends. */
 function sliders() {
-  const base = atRest, {spans} = data, list = [], {factor} = first.strike;
+  const base = atRest, {spans} = data, {factor} = first.strike;
   const part = factor > 1 ? ` (1/${factor})` : "";
   const spread = (value, [low, high], power = 1) => [value * low ** power, value * high ** power];
   const v = first.strike.velocity, of = {energy: spread(base.energy, spans.energy), velocity: spread(v, spans.energy, 0.5),
     height: data.gravity ? spread(v * v / (2 * data.gravity), spans.energy) : null};
-  list.push({group: "Impact", name: state.speed, label: {energy: "energy", velocity: "velocity", height: "height"}[state.speed], ends: of[state.speed]});
+  const list = [{group: "Impact", name: state.speed, label: state.speed, ends: of[state.speed]}];
   if (first.strike.scales) list.push({group: "Impact", name: "mass", label: `mass${part}`, ends: spread(base.mass, spans.mass)});
   list.push(state.law === "k" ? {group: "Contact", name: "k", label: `stiffness k${part}`, ends: spread(base.k, spans.k)}
-    : {group: "Contact", name: "radius", label: "radius", ends: spread((base.k / first.strike.unitK) ** 2, spans.k, 1)});
+    : {group: "Contact", name: "radius", label: "radius", ends: spread((base.k / first.strike.unitK) ** 2, spans.k)});
   if (base.giic !== null) {
     list.push({group: "Laminate", name: "giic", label: "toughness G_IIc", ends: spread(base.giic, spans.giic)});
     for (const [name, label] of [["energy", "energy"], ["k", "k"], ["giic", "toughness G_IIc"]])
@@ -188,11 +188,9 @@ function build() {
   });
   choice("Impact", "speed", "given by", [["energy", "energy"], ["velocity", "velocity"], ...(data.gravity ? [["height", "drop height"]] : [])]);
   for (const slider of sliders()) {
-    if (slider.name === "k" && !slider.scatter && first.strike.unitK) lawChoice();
-    if (slider.name === "radius") lawChoice();
+    if (slider.group === "Contact" && first.strike.unitK) choice("Contact", "law", "given by", [["k", "k"], ["radius", "steel tip (estimate)"]]);
     fieldset(slider.group).append(row(slider));
   }
-  function lawChoice() { choice("Contact", "law", "given by", [["k", "k"], ["radius", "steel tip (estimate)"]]); }
   byId("sliders").replaceChildren(...groups.values());
   if (focus) byId(focus)?.focus({preventScroll: true});
 }
@@ -225,8 +223,8 @@ function row({group, name, label, ends, scatter}) {
 
 // Worker --------------------------------------------------------------------------------------------------------
 
-let worker, asked = 0, now = null;
-const shown = {number: 0, found: null, curve: null, draws: null, extended: false, done: false};
+let worker, asked = 0, now;
+const shown = {number: 0, plate: 0, found: null, curve: null, draws: null, extended: false, done: false};
 
 /** Ask the worker for the state of the sliders; what is shown stays until the answer is there. */
 function changed() {
@@ -248,6 +246,7 @@ function answered({data: answer}) {
 
 function pending() {
   const isPending = shown.number !== asked || !shown.done;
+  byId("pin").disabled = shown.number !== asked;
   document.body.dataset.ready = String(!isPending);
   for (const name of ["from", "curve", "draws", "commands"]) byId(name)?.setAttribute("aria-busy", isPending);
 }
@@ -258,19 +257,18 @@ const SHOWN = ["peak_force", "time_of_peak", "contacts", "contact_time", "max_de
                "impulse", "rebound_velocity", "energy_absorbed", "contact_loop"];
 
 function draw() {
-  const plate = plateOf(state), pins = state.pins, rows = judgements(plate, now), found = shown.found;
+  const plate = data.plates[shown.plate], {pins} = state, rows = judgements(plate, now), {found} = shown, {energy} = now;
   const delaminates = now.limit > 0 ? now.reached >= now.limit : null;
   const level = now.limit > 0 ? {value: now.limit, label: "delamination threshold"} : null;
   const band = level && plate.threshold.band.map(force => force * now.limit / plate.threshold.force);
   const from = found ? `${plate.threshold.from} ${quantity("energy", found)}` : found === null ? "" : "at no energy near these";
-  const worst = rows.some(one => one.level === "outside the model") ? "outside" : rows.some(one => one.level === "doubtful") ? "doubtful" : "within";
-  const energy = energyOf({...plate.strike, mass: now.impact.mass}, now.impact.velocity);
   const chance = shown.draws && shown.draws.ratios.filter(ratio => ratio >= 1).length / shown.draws.ratios.length;
   const line = delaminates === null ? ["Peak force: ", element("strong", {}, quantity("peak_force", now.peak_force))]
     : ["Delaminates: ", element("strong", {}, delaminates ? "yes" : isNaN(now.peak_force) ? "open" : "no"), element("span", {id: "from"}, from && `; ${from}`)];
   const doubts = rows.filter(one => ["outside", "doubtful"].includes(tag(one.level)));
-  byId("answer").className = worst;
-  byId("answer").replaceChildren(element("p", {}, ...line), ...(doubts.length ? [element("p", {}, `${worst === "outside" ? "Outside the model" : "Doubtful"}: ${doubts.map(one => `${one.quantity} ${one.size}`).join(", ")}`)] : []));
+  const isOutside = doubts.some(one => tag(one.level) === "outside"), doubt = isOutside ? "Outside the model" : "Doubtful";
+  byId("answer").className = isOutside ? "outside" : doubts.length ? "doubtful" : "within";
+  byId("answer").replaceChildren(element("p", {}, ...line), ...(doubts.length ? [element("p", {}, `${doubt}: ${doubts.map(one => `${one.quantity} ${one.size}`).join(", ")}`)] : []));
   const heads = [["peak force", "peak_force", ""], ["time in contact", "contact_time", ""],
     ["deflection", "max_deflection", isNaN(now.max_deflection) ? "" : `${digits(now.max_deflection / plate.thickness, 3)} h`], ["rebound", "rebound_velocity", ""]];
   byId("headlines").replaceChildren(...[["impact", "", `${quantity("energy", energy)}`, `${quantity("velocity", now.impact.velocity)}`],
@@ -297,11 +295,13 @@ function draw() {
     byId("probability").textContent = Object.values(state.scatter).some(size => size > 0) ? "being computed" : "Give the energy, k or the toughness a scatter to see how sure the answer is.";
   }
   table(byId("trust"), ["quantity", "size", "verdict", "why"], rows.map(one => [one.quantity, one.size, element("span", {class: `mark ${tag(one.level)}`}, one.level), one.words]));
-  table(byId("numbers"), ["quantity", "now", ...pins.map((_, n) => `pinned ${n + 1}`)],
-    SHOWN.map(name => [data.labels[name], ...[now, ...pins.map(pin => pin.result)].map(result => cell(name, result[name]))])
-      .concat(now.limit > 0 ? [["delamination threshold", ...[now, ...pins.map(pin => pin.result)].map(result => cell("peak_force", result.limit))],
-        ["energy from which it delaminates", cell("energy", found ?? NaN), ...pins.map(pin => cell("energy", pin.found ?? NaN))],
-        ...(chance === null ? [] : [["chance that it delaminates", element("data", {value: chance}, digits(chance, 3)), ...pins.map(() => "")]])] : []));
+  const results = [now, ...pins.map(pin => pin.result)], founds = [found, ...pins.map(pin => pin.found)];
+  const numbers = (label, name, values) => [label, ...values.map(value => cell(name, value ?? NaN))];
+  table(byId("numbers"), ["quantity", "now", ...pins.map((_, n) => `pinned ${n + 1}`)], [
+    ...SHOWN.map(name => numbers(data.labels[name], name, results.map(result => result[name]))),
+    ...(now.limit > 0 ? [numbers("delamination threshold", "peak_force", results.map(result => result.limit)),
+                         numbers("energy from which it delaminates", "energy", founds)] : []),
+    ...(chance === null ? [] : [["chance that it delaminates", element("data", {value: chance}, digits(chance, 3)), ...pins.map(() => "")]])]);
   if (shown.done) commands(chance !== null);
 }
 
@@ -323,7 +323,6 @@ function histogram({ratios, open}, chance) {
   chart(byId("draws"), {x: {name: "none", label: "peak force over the threshold", most}, y: {name: "none", label: "impacts", most: 1.1 * Math.max(...counts)},
     bars: counts.map((count, n) => ({from: n * size, to: (n + 1) * size, height: count, kind: n * size >= 1 - size / 2 ? "above" : ""})), level: {of: "x", value: 1}, words: text});
 }
-data.units.none = ["", "", 0];
 
 // Commands ------------------------------------------------------------------------------------------------------
 
@@ -438,8 +437,7 @@ function start() {
     const text = JSON.stringify(kept()).replaceAll("<", "\\u003c");
     download(`${stem}.html`, "text/html", `<!DOCTYPE html>\n${source.replace(/(<script type="application\/json" id="state">)[^<]*/, (_, tagged) => tagged + text)}`);
   });
-  addEventListener("resize", () => draw());
-  addEventListener("beforeprint", () => draw());
+  for (const name of ["resize", "beforeprint"]) addEventListener(name, () => now && draw());
   build();
   changed();
 }

@@ -80,6 +80,7 @@ class PagePlate(ABC):
     draws: ClassVar[int]  # random impacts of a chance
     search: ClassVar[tuple[int, float]]  # velocities that a search tries first, and their span
     unjudged: ClassVar[str]
+    price: ClassVar[str] = ""  # what takes long
 
     def __init__(self, problem: Problem, impacts: Impacts) -> None:
         self._problem, self._impacts = problem, impacts
@@ -136,6 +137,9 @@ class ReducedPlate(PagePlate):
     function = "fecm_reduced"
     draws, search = 200, (16, 4.0)
     unjudged = "failure of plies, slope and strain"
+    price = (
+        "two or three full runs of each plate check its bending modes before the page is written"
+    )
 
     def __init__(self, problem: Problem, impacts: Impacts) -> None:
         super().__init__(problem, impacts)

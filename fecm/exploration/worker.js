@@ -155,7 +155,7 @@ function* work({number, plate: row, impact, scatter}) {
   const plate = data.plates[row], say = parts => postMessage({number, ...parts}), {mass, k, giic} = impact;
   if (kernel.plate !== plate) kernel.load(plate);
   const now = kernel.one(impact), steps = Math.min(plate.steps, kernel.enough);
-  say({now});
+  say({now, plate: row});
   yield;
   const energy = velocity => energyOf(plate, {mass, velocity}), speed = value => Math.sqrt(2 * value / plate.strike.factor / mass);
   const many = function* (impacts) {
