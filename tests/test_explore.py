@@ -440,6 +440,32 @@ def test_without_scripts_the_page_says_so_and_shows_the_run_of_the_deck(
 
 
 @pytest.mark.browser
+def test_the_frame_of_a_notebook_has_no_origin_and_runs_the_page(
+    folder: Path, tmp_path: Path
+) -> None:
+    program = find_browser()
+    if program is None:
+        pytest.skip("no Chromium or Chrome found")
+    frame = fecm.explore(folder / "d7136.inp")._repr_html_()
+    notebook = tmp_path / "notebook.html"
+    notebook.write_text(f"<!DOCTYPE html><meta charset=utf-8>{frame}", encoding="utf-8")
+    with Browser(program, tmp_path / "profile") as browser:
+        browser.do(
+            "Target.setAutoAttach", autoAttach=True, waitForDebuggerOnStart=False, flatten=True
+        )
+        browser.open(notebook)
+        (session,) = (
+            event["params"]["sessionId"]
+            for event in browser.events
+            if event["method"] == "Target.attachedToTarget"
+        )
+        browser._session = session  # of the frame
+        settled(browser)
+        assert browser.value("location.origin") == "null"
+        assert numbers(browser)["peak_force"] > 0.0
+
+
+@pytest.mark.browser
 def test_a_measured_force_and_several_plates_are_drawn(folder: Path, browser: Browser) -> None:
     measured = (np.linspace(0.0, 4e-3, 50), 4000.0 * np.sin(np.linspace(0.0, np.pi, 50)))
     page = fecm.explore(folder / "d7136.inp", {"ply_thickness": [0.184, 0.15]}, overlay=measured)
