@@ -47,7 +47,6 @@ def test_a_change_of_a_source_makes_the_module_stale(tmp_path: Path) -> None:
     ],
     ids=["rod", "rigid-mass", "rods", "yang-sun", "stretching"],
 )
-@pytest.mark.long
 def test_webassembly_gives_the_forces_of_the_library(
     deck: str, cases: list[Case], options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -156,7 +156,7 @@ function sliders() {
     height: data.gravity ? spread(v * v / (2 * data.gravity), spans.energy) : null};
   const list = [{group: "Impact", name: state.speed, label: state.speed, ends: of[state.speed]}];
   if (first.strike.scales) list.push({group: "Impact", name: "mass", label: `mass${part}`, ends: spread(base.mass, spans.mass)});
-  list.push(state.law === "k" ? {group: "Contact", name: "k", label: `stiffness k${part}`, ends: spread(base.k, spans.k)}
+  list.push(state.law === "k" ? {group: "Contact", name: "k", label: `coefficient k${part}`, ends: spread(base.k, spans.k)}
     : {group: "Contact", name: "radius", label: "radius", ends: spread((base.k / first.strike.unitK) ** 2, spans.k)});
   if (base.giic !== null) {
     list.push({group: "Laminate", name: "giic", label: "toughness G_IIc", ends: spread(base.giic, spans.giic)});
