@@ -375,6 +375,21 @@ def test_hostile_texts_of_a_deck_and_of_an_address_stay_texts(
 
 
 @pytest.mark.browser
+def test_a_worker_of_the_page_has_the_policy_of_the_page(folder: Path, browser: Browser) -> None:
+    browser.open(folder / "d7136.html")
+    code = 'try { eval(""); postMessage("ran"); } catch (error) { postMessage(error.name); }'
+    answer = browser.do(
+        "Runtime.evaluate",
+        expression=f"""new Promise(resolve => {{
+            const worker = new Worker(URL.createObjectURL(new Blob([{json.dumps(code)}])));
+            worker.onmessage = message => resolve(message.data);
+        }})""",
+        awaitPromise=True,
+    )
+    assert answer["result"]["value"] == "EvalError"
+
+
+@pytest.mark.browser
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [390, 1400])
 def test_the_page_fits_the_window_and_its_texts_are_legible(

@@ -280,9 +280,11 @@ class ReducedModel:
     @property
     def note(self) -> str:
         """Sentence about the cases that are run in full, and the reason."""
-        cases = "the case" if self.in_full == 1 else f"the {self.in_full} cases"
+        cases = f"the {self.in_full} cases of the largest energies are"
+        if self.in_full == 1:
+            cases = "the case of the largest energy is"
         more = "" if self.modes >= MOST_MODES else "; with more modes they may be fewer"
-        return f"{self._misfit}: {cases} of the largest energies are run in full{more}"
+        return f"{self._misfit}: {cases} run in full{more}"
 
     @property
     def _misfit(self) -> str:
