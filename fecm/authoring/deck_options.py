@@ -231,7 +231,7 @@ class ImpactOptions(DeckOptions):
     )
     precision: Precision = option(
         "single",
-        "Precision of stored displacements, strains, stresses and exposures; single also "
+        "Precision of stored displacements, strains and stresses; single also "
         "compresses the file (COMP).",
         choices=get_args(Precision),
         group="Numerics",
