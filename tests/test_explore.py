@@ -145,6 +145,12 @@ def test_the_command_says_that_a_stretching_plate_takes_full_runs(tmp_path: Path
     assert "full runs" not in call("explore", "linear.inp", cwd=tmp_path).stderr
 
 
+def test_a_stretching_plate_needs_a_run_that_knows_its_peak() -> None:
+    cut = STRETCHING.replace("LOOP        390", "LOOP         99")
+    with pytest.raises(fecm.errors.ExploreError, match="before its peak force is known"):
+        _ = fecm.explore(cut).html
+
+
 def test_a_page_in_modes_that_do_not_give_the_peak_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

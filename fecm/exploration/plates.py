@@ -189,6 +189,11 @@ class ReducedPlate(PagePlate):
         impacts = self._impacts.at_velocities(np.zeros(1, dtype=np.intp), velocity)
         outcome = self._backend.outcomes(impacts, judged=False)
         full = run or run_quietly(impacts.deck(0))
+        if np.isnan(full.peak_force):
+            raise ExploreError(
+                "the run ends before its peak force is known, so that the modes of the plate can't "
+                "be compared with it: take more steps"
+            )
         return float(outcome.columns[PEAK_FORCE][0] / full.peak_force - 1.0)
 
 
