@@ -26,9 +26,6 @@ WORTH_GROUPING = 8
 SYMMETRIC = 1e-14
 
 
-# Value, twice the slope, and second derivative at 0 of a quadratic function, from its values at
-# -1, 0 and 1.
-QUADRATIC = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 1.0], [1.0, -2.0, 1.0]])
 # Fields of a GroupStruct by name.
 Fields = dict[str, int | Floats | NDArray[np.int32]]
 
@@ -179,14 +176,13 @@ class ElementGroup:
     @property
     def needs_data(self) -> bool:
         """Whether the kernels need data at the points of quadrature."""
-        return not self.has_matrix or (self._nonlinear and not self.parallelograms)
+        return not self.has_matrix
 
     def _is_factorized(self) -> bool:
         """Return whether the kernels sum along xi, then eta, for elements without a matrix."""
         plate, family, rules = self._plate, self.family, self._plate.rules
         return family.nodes.shape[1] == family.shape.nodes == 9 and not (
-            self._nonlinear
-            or plate.is_preloaded
+            plate.is_preloaded
             or plate.is_curved
             or (rules.assumes_shear and rules.transposed_jacobian)
         )
@@ -295,7 +291,8 @@ class ElementGroup:
         """
         members = self._distinct_members(members)
         if self.kind == ElementKind.FACTORIZED:
-            return _in_lanes(self._coefficients(members))
+            family = self.family.take(members)
+            return _in_lanes(membrane.shape_numbers(family, self._weights[members]))
         family = self.family.take(members)
         assumed, swaps = self._plate.rules.assumes_shear, self._plate.rules.transposed_jacobian
         # Assumed shear strains never use the transposed Jacobian.
@@ -321,15 +318,6 @@ class ElementGroup:
                 parallelograms=self.parallelograms,
             )
         )
-
-    def _coefficients(self, members: Indices) -> Floats:
-        """Return a quarter of the weights, and the coordinates' coefficients except constants."""
-        places = np.ascontiguousarray(self.family.coordinates.swapaxes(1, 2))
-        places -= places[:, :, self.order[4], None]  # the centre
-        table = np.kron(QUADRATIC, QUADRATIC)[1:, np.argsort(self.order)]
-        coefficients = (places.reshape(-1, 9) @ table.T).reshape(-1, 16)
-        weights = 0.25 * self._weights[members, None]
-        return np.concatenate([weights, coefficients[members]], axis=1)
 
     def _at_points(
         self, rule: Quadrature, family: ElementBlock, members: Indices, *, transposed: bool

@@ -142,6 +142,7 @@ enum { SUMS = 5 }; /* number of sums; every chunk has a half for each */
 static const double ALONG[] = {-0.57735026918962576, 0.57735026918962576};
 static const double ACROSS[] = {-0.77459666924148338, 0.0, 0.77459666924148338};
 static const double SPREAD = 0.67082039324993691;
+static const double GAUSS[] = {5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0}; /* weights of the points across */
 
 /* Number of modes of the strains of parallelograms, and the integrals of their squares. */
 enum { MODES = 8 };

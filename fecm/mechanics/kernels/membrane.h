@@ -38,8 +38,8 @@
  * Data of a block.  `membrane` starts with x_1/2 and x_2/2 (4), because `slopes` gives twice the slopes, and
  * with the upper triangles of A_c and -B_c (6 + 6), which for parallelograms are multiplied by determinant and
  * weight.  Other elements also have R_1/2 at the tying points of e_11 (6, 2), R_2/2 at the tying points of e_22
- * (6, 2), and both at the tying points of e_12 (4, 4); their `data` is as in TABULATED elements, with the
- * points in rows of eta.
+ * (6, 2), and both at the tying points of e_12 (4, 4), and the numbers of FACTORIZED elements (17): a factor, and
+ * coefficients of x and y.
  *
  * Curved plate.  The covariant strains contain w/R at the points; 1/R are the last numbers (3) of every
  * element.  No element is treated as a parallelogram, because the modes do not contain w.
@@ -328,37 +328,47 @@ INLINE void NAME(add_curved)(const double *data, const half *c, half (*e)[9]) {
     for (int b = 0; b < 3; b++) NAME(values)(3, ACROSS, c[3 * b], c[3 * b + 1], c[3 * b + 2], v[b], 1);
     for (int l = 0; l < 3; l++) NAME(values)(3, ACROSS, v[0][l], v[1][l], v[2][l], w + l, 3);
     for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 9; k++) e[i][k] += AT(56 + i) * w[k];
+        for (int k = 0; k < 9; k++) e[i][k] += AT(73 + i) * w[k];
 }
 
 INLINE void NAME(sum_curved)(const double *data, half (*n)[9], half *force) {
     half at[9], v[3][3] = {{{0}}};
-    for (int k = 0; k < 9; k++) at[k] = AT(56) * n[0][k] + AT(57) * n[1][k] + AT(58) * n[2][k];
+    for (int k = 0; k < 9; k++) at[k] = AT(73) * n[0][k] + AT(74) * n[1][k] + AT(75) * n[2][k];
     for (int l = 0; l < 3; l++) NAME(sum_values)(3, ACROSS, at + l, 3, &v[0][l], &v[1][l], &v[2][l]);
     for (int b = 0; b < 3; b++) NAME(sum_values)(3, ACROSS, v[b], 1, force + 3 * b, force + 3 * b + 1, force + 3 * b + 2);
 }
 
+/* R and areas of the 9 points, from the coefficients of x and y. */
+INLINE void NAME(frames)(const double *data, half (*R)[4], half *area) {
+    const half xx = 4.0 * AT(0), xy = 4.0 * AT(1), yx = 4.0 * AT(2), yy = 4.0 * AT(3), zero = {0};
+    half along[2][9], across[2][9], c[2][9]; /* slopes of x and y, doubled */
+    for (int i = 0; i < 2; i++) {
+        c[i][0] = zero;
+        for (int k = 1; k < 9; k++) c[i][k] = AT(56 + 8 * i + k);
+        NAME(gradient)(3, ACROSS, 3, ACROSS, c[i], along[i], across[i]);
+    }
+    for (int k = 0; k < 9; k++) {
+        const half x_1 = along[0][k], y_1 = along[1][k], x_2 = across[0][k], y_2 = across[1][k];
+        const half determinant = x_1 * y_2 - x_2 * y_1, share = 1.0 / determinant;
+        R[k][0] = share * (xx * y_2 - xy * x_2), R[k][1] = share * (xy * x_1 - xx * y_1);
+        R[k][2] = share * (yx * y_2 - yy * x_2), R[k][3] = share * (yy * x_1 - yx * y_1);
+        area[k] = GAUSS[k / 3] * GAUSS[k % 3] * AT(56) * determinant;
+    }
+}
+
 /* Forces on the coefficients of an element that is not a parallelogram, or belongs to a curved plate.  The
  * forces of w/R, which are linear in w, are stored in `lifting`. */
-INLINE void NAME(of_points)(int coupled, int curved, const double *data, const double *points, half (*c)[9], half (*force)[9],
-                            half *lifting) {
-    half e[3][9], linear[3][9], bent[3][9], moment[3][9], R[9][4], A[6], B[6];
+INLINE void NAME(of_points)(int coupled, int curved, const double *data, half (*c)[9], half (*force)[9], half *lifting) {
+    half e[3][9], linear[3][9], bent[3][9], moment[3][9], R[9][4], areas[9], A[6], B[6];
     NAME(Tied) tied;
     NAME(tied_strains)(data + 16 * LANES, c[2], &tied, e);
-    const half xx = 2.0 * AT(0), xy = 2.0 * AT(1), yx = 2.0 * AT(2), yy = 2.0 * AT(3);
-    for (int k = 0; k < 9; k++) {
-        const double *inverse = points + 5 * k * LANES;
-        const half xi_x = NAME(load)(inverse), eta_x = NAME(load)(inverse + LANES);
-        const half xi_y = NAME(load)(inverse + 2 * LANES), eta_y = NAME(load)(inverse + 3 * LANES);
-        R[k][0] = xx * xi_x + xy * xi_y, R[k][1] = xx * eta_x + xy * eta_y;
-        R[k][2] = yx * xi_x + yy * xi_y, R[k][3] = yx * eta_x + yy * eta_y;
-    }
+    NAME(frames)(data, R, areas);
     NAME(strains_of)(R, c, linear);
     if (curved) NAME(add_curved)(data, c[2], linear);
     if (coupled) NAME(strains_of)(R, c + 3, bent);
     for (int i = 0; i < 6; i++) A[i] = AT(4 + i), B[i] = AT(10 + i);
     for (int k = 0; k < 9; k++) {
-        const half area = NAME(load)(points + (5 * k + 4) * LANES);
+        const half area = areas[k];
         half strain[3], curvature[3], stress[3], other[3];
         for (int i = 0; i < 3; i++) strain[i] = area * (e[i][k] + linear[i][k]);
         NAME(stresses)(1, 1, A, strain, stress);
@@ -411,7 +421,7 @@ INLINE void NAME(stretch)(int coupled, int modes, int curved, const Plate *p, co
         if (modes)
             NAME(of_modes)(coupled, data, c, force);
         else
-            NAME(of_points)(coupled, curved, data, b->data + 4 * side, c, force, lifting);
+            NAME(of_points)(coupled, curved, data, c, force, lifting);
         /* w f_w is twice this work, because eps_q is of second order. */
         half sum = 0.5 * c[2][1] * force[2][1];
         for (int i = 2; i < 9; i++) sum += 0.5 * c[2][i] * force[2][i];

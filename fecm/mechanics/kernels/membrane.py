@@ -52,7 +52,7 @@ def numbers(
     *,
     parallelograms: bool,
 ) -> Floats:
-    """Return the data of elements: (ne, 16) for parallelograms, (ne, 56) or (ne, 59) otherwise.
+    """Return the data of elements: (ne, 16) for parallelograms, (ne, 73) or (ne, 76) otherwise.
 
     The data of every element start with halves of the base vectors x,xi and x,eta of the centre,
     (2, 2), and with the upper triangles of A and -B for covariant strains, (6,) each.  For
@@ -61,8 +61,8 @@ def numbers(
 
     Other elements also have derivatives along half a base vector, per derivative in xi and in eta:
     along the first vector at the tying points of e_11, (6, 2), along the second vector at the tying
-    points of e_22, (6, 2), and along both vectors at the tying points of e_12, (4, 2, 2).  With a
-    curvature the covariant strains per w follow, (3,).
+    points of e_22, (6, 2), and along both vectors at the tying points of e_12, (4, 2, 2), and the
+    :func:`shape_numbers`, (17,).  With a curvature the covariant strains per w follow, (3,).
     """
     centre, laminate = _centre(family), plate.laminate_of(family)
     to_global = membrane.covariant_to_global(centre)
@@ -81,9 +81,25 @@ def numbers(
             _, local = local_shape_functions(family, _product(xi, eta))
             inverse, _ = inverse_jacobian(family, local)
             parts.append((0.5 * centre[:, None] @ inverse)[:, :, rows])
+        parts.append(shape_numbers(family, weights))
     if curvature != FLAT:
         parts.append(np.linalg.inv(to_global) @ strain_of_deflection(curvature))
     return np.concatenate([part.reshape(len(centre), -1) for part in parts], axis=1)
+
+
+# Value, twice the slope, and second derivative at 0 of a quadratic function, from its values at
+# -1, 0 and 1.
+QUADRATIC = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 1.0], [1.0, -2.0, 1.0]])
+
+
+def shape_numbers(family: ElementBlock, weights: Floats) -> Floats:
+    """Return a quarter of the weights, and coefficients of x and y without constants, (ne, 17)."""
+    order = node_grid(family)
+    places = np.ascontiguousarray(family.coordinates.swapaxes(1, 2))
+    places -= places[:, :, order[4], None]  # the centre
+    table = np.kron(QUADRATIC, QUADRATIC)[1:, np.argsort(order)]
+    coefficients = (places.reshape(-1, 9) @ table.T).reshape(-1, 16)
+    return np.concatenate([0.25 * weights[:, None], coefficients], axis=1)
 
 
 def in_rows(rule: Quadrature) -> Quadrature:

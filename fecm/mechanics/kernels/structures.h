@@ -47,7 +47,7 @@ typedef struct {
     /* TABULATED: inverse Jacobian with its determinant times the weight, (points, 5, 8), and slopes of the
      * mapping (2 tying, 2, 8).  FACTORIZED: a factor, and coefficients of x and y, (1 + 8 + 8, 8). */
     const double *data;
-    const double *membrane; /* nonlinear plate: (16, 8) for parallelograms, (56, 8) for others, (59, 8) if curved */
+    const double *membrane; /* nonlinear plate: (16, 8) for parallelograms, (73, 8) for others, (76, 8) if curved */
 } Block;
 
 /* Spring or one-sided support of the entry `at` of a chunk; `side` is 0 for a spring.  See supports.py. */
