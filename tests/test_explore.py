@@ -327,12 +327,30 @@ def test_the_chance_is_that_of_a_random_sweep(folder: Path, browser: Browser) ->
     chance = browser.value(
         "shown.draws.ratios.filter(ratio => ratio >= 1).length / shown.draws.ratios.length"
     )
-    _, _, command = commands(browser)
+    command = commands(browser)[-1]
     done = call(*shlex.split(command)[1:], "--format", "json", cwd=folder)
     assert done.exit_code == 0, done.stderr
     (wanted,) = json.loads(done.stdout)["random"]["exceedance"]["probability"]
     assert 0.05 < chance < 0.95
     assert abs(chance - wanted) <= 2.0 * np.sqrt(2.0 * chance * (1.0 - chance) / 1000)
+
+
+@pytest.mark.browser
+def test_the_energies_of_tough_and_brittle_plates_are_those_that_a_search_finds(
+    folder: Path, browser: Browser
+) -> None:
+    browser.open(folder / "d7136.html")
+    settled(browser)
+    set_values(browser, **{"scatter-giic-value": 10})
+    shares = dict(browser.value("shown.range"))
+    command = commands(browser)[2]
+    assert "--random giic=lognormal:0.7879,0.1 --samples 100 --find" in command
+    for share, z in (("5 %", -1.6449), ("95 %", 1.6449)):
+        toughness = 0.7879 * float(np.exp(0.1 * z))
+        command = f"fecm sweep d7136.inp --vary giic={toughness} --find velocity "
+        command += "--until peak_force=threshold -o found.h5 --overwrite"
+        found = swept(command, folder)
+        assert to_four_digits(shares[share], found["found_energy"][0])
 
 
 @pytest.mark.browser

@@ -224,7 +224,7 @@ function row({group, name, label, ends, scatter}) {
 // Worker --------------------------------------------------------------------------------------------------------
 
 let worker, asked = 0, now;
-const shown = {number: 0, plate: 0, found: null, curve: null, draws: null, extended: false, done: false};
+const shown = {number: 0, plate: 0, found: null, range: [], curve: null, draws: null, extended: false, done: false};
 
 /** Ask the worker for the state of the sliders; what is shown stays until the answer is there. */
 function changed() {
@@ -248,7 +248,7 @@ function pending() {
   const isPending = shown.number !== asked || !shown.done;
   byId("pin").disabled = shown.number !== asked;
   document.body.dataset.ready = String(!isPending);
-  for (const name of ["from", "curve", "draws", "commands"]) byId(name)?.setAttribute("aria-busy", isPending);
+  for (const name of ["from", "shares", "curve", "draws", "commands"]) byId(name)?.setAttribute("aria-busy", isPending);
 }
 
 // Page ----------------------------------------------------------------------------------------------------------
@@ -262,13 +262,15 @@ function draw() {
   const level = now.limit > 0 ? {value: now.limit, label: "delamination threshold"} : null;
   const band = level && plate.threshold.band.map(force => force * now.limit / plate.threshold.force);
   const from = found ? `${plate.threshold.from} ${quantity("energy", found)}` : found === null ? "" : "at no energy near these";
+  const shares = shown.range.map(([share, value]) => `${share} of plates from ${quantity("energy", value)}`);
   const chance = shown.draws && shown.draws.ratios.filter(ratio => ratio >= 1).length / shown.draws.ratios.length;
   const line = delaminates === null ? ["Peak force: ", element("strong", {}, quantity("peak_force", now.peak_force))]
     : ["Delaminates: ", element("strong", {}, delaminates ? "yes" : isNaN(now.peak_force) ? "open" : "no"), element("span", {id: "from"}, from && `; ${from}`)];
   const doubts = rows.filter(one => ["outside", "doubtful"].includes(tag(one.level)));
   const isOutside = doubts.some(one => tag(one.level) === "outside"), doubt = isOutside ? "Outside the model" : "Doubtful";
   byId("answer").className = isOutside ? "outside" : doubts.length ? "doubtful" : "within";
-  byId("answer").replaceChildren(element("p", {}, ...line), ...(doubts.length ? [element("p", {}, `${doubt}: ${doubts.map(one => `${one.quantity} ${one.size}`).join(", ")}`)] : []));
+  byId("answer").replaceChildren(element("p", {}, ...line),
+    ...(shares.length ? [element("p", {id: "shares"}, `With this scatter of G_IIc, ${shares.join(", ")}`)] : []), ...(doubts.length ? [element("p", {}, `${doubt}: ${doubts.map(one => `${one.quantity} ${one.size}`).join(", ")}`)] : []));
   const heads = [["peak force", "peak_force", ""], ["time in contact", "contact_time", ""],
     ["deflection", "max_deflection", isNaN(now.max_deflection) ? "" : `${digits(now.max_deflection / plate.thickness, 3)} h`], ["rebound", "rebound_velocity", ""]];
   byId("headlines").replaceChildren(...[["impact", "", `${quantity("energy", energy)}`, `${quantity("velocity", now.impact.velocity)}`],
@@ -344,14 +346,15 @@ function options(out = []) {
 function commands(withChance) {
   const {name} = data.deck, out = quoted(name.replace(/(\.[^.]*)?$/, "-explored.h5").replace(/^.*[/\\]/, ""));
   const parts = (more, left) => ["fecm sweep", quoted(name), options(left), more, `-o ${out} --overwrite`].filter(Boolean).join(" ");
+  const find = "--find velocity --until peak_force=threshold", {velocity, mass, k, giic} = impactOf(state);
+  const values = {energy: energyOf({...plateOf(state).strike, mass}, velocity), k, giic};
+  const scattered = Object.keys(values).filter(name => state.scatter[name] > 0);
+  const random = (names, samples) => `${names.map(name => `--random ${name}=lognormal:${values[name]},${state.scatter[name] / 100}`).join(" ")} --samples ${samples}`;
   const list = [["this impact", parts("--measure max_deflection")]];
-  if (now.limit > 0) list.push(["the energy from which it delaminates", parts("--find velocity --until peak_force=threshold", ["energy", "velocity"])]);
-  if (withChance && state.law === "k") {
-    const {velocity, mass, k, giic} = impactOf(state), values = {energy: energyOf({...plateOf(state).strike, mass}, velocity), k, giic};
-    const random = Object.entries(state.scatter).filter(([, size]) => size > 0);
-    list.push(["the chance, with draws of its own", parts(`${random.map(([key, size]) => `--random ${key}=lognormal:${values[key]},${size / 100}`).join(" ")} --samples ${plateOf(state).draws} --exceed peak_force=threshold`,
-      random.map(([key]) => key).concat(random.some(([key]) => key === "energy") ? ["velocity"] : []))]);
-  }
+  if (now.limit > 0) list.push(["the energy from which it delaminates", parts(find, ["energy", "velocity"])]);
+  if (shown.range.length) list.push(["this energy with the scatter of G_IIc", parts(`${random(["giic"], 100)} ${find}`, ["energy", "velocity", "giic"])]);
+  if (withChance && state.law === "k") list.push(["the chance, with draws of its own",
+    parts(`${random(scattered, plateOf(state).draws)} --exceed peak_force=threshold`, [...scattered, ...scattered.includes("energy") ? ["velocity"] : []])]);
   byId("commands").replaceChildren(...list.map(([label, text], n) => {
     const pre = element("pre", {id: `command-${n}`, tabindex: "0"}, text), button = element("button", {type: "button", "aria-label": `Copy the command of ${label}`}, "Copy");
     button.addEventListener("click", async () => {

@@ -5,6 +5,7 @@
 // work for the one before.  All values are in the deck's units.
 const LANES = 8; // cases that the kernel computes in the time of one
 const CURVE = 40, SLICE = 12; // points, ms of work between two messages
+const NORMAL95 = 1.6449; // 95 % of standard normal numbers are smaller
 
 const turns = new MessageChannel();
 let data, kernel, job = null, isPlanned = false;
@@ -148,7 +149,14 @@ function endOf(m, held, reach) {
 
 // Work ----------------------------------------------------------------------------------------------------------
 
-let known = ""; // what the last threshold energy and curve belong to
+const last = new Map(); // keys and values of the last answers, by name
+
+/** Value of the last answer if its key is the same, and of a new computation otherwise. */
+function* kept(name, key, compute) {
+  const text = key.join();
+  if (last.get(name)?.text !== text) last.set(name, {text, value: yield* compute()});
+  return last.get(name).value;
+}
 
 /** Answer a message: each yield is a moment for the next one. */
 function* work({number, plate: row, impact, scatter}) {
@@ -166,20 +174,26 @@ function* work({number, plate: row, impact, scatter}) {
     }
     return results;
   };
-  const widest = Math.max(data.spans.energy[1] * energyOf(plate, plate.strike), now.energy), key = [row, mass, k, giic, widest].join();
-  if (key !== known) {
-    const found = now.limit > 0 ? energy(yield* searched(impact, plate, now.limit, many)) : null;
-    say({found});
+  const reached = limit => () => searched(impact, plate, limit, many);
+  const found = now.limit > 0 ? energy(yield* kept("found", [row, mass, k, giic], reached(now.limit))) : null;
+  say({found});
+  const widest = Math.max(data.spans.energy[1] * energyOf(plate, plate.strike), now.energy);
+  say({curve: yield* kept("curve", [row, mass, k, giic, widest], function* () {
     const most = 1.04 * Math.max(widest, found < 4 * widest ? 1.3 * found : 0);
     const energies = Array.from({length: CURVE}, (_, n) => most * (n + 1) / CURVE);
     const peaks = yield* many(energies.map(value => ({...impact, velocity: speed(value)})));
-    say({curve: {energies: [0, ...energies], peaks: [0, ...peaks.map(one => one.reached)], most}});
-    known = key;
-  }
+    return {energies: [0, ...energies], peaks: [0, ...peaks.map(one => one.reached)], most};
+  })});
+  const range = [];
+  if (found && scatter.giic)
+    for (const [name, sign] of [["5 %", -1], ["95 %", 1]]) { // the threshold goes with the root of G_IIc
+      const limit = now.limit * Math.exp(0.5 * sign * NORMAL95 * 0.01 * scatter.giic);
+      range.push([name, energy(yield* kept(name, [row, mass, k, limit], reached(limit)))]);
+    }
   const draws = now.limit > 0 && Object.values(scatter).some(size => size > 0) ? yield* drawn(impact, plate, scatter, many) : null;
   // The page goes on for longer than the program of the deck, where the impact does.
   const inDeck = Math.round(plate.program / plate.dt);
-  say({draws, extended: inDeck < plate.steps && !isDecided(kernel.run([impact], inDeck)[0]), done: true});
+  say({draws, range, extended: inDeck < plate.steps && !isDecided(kernel.run([impact], inDeck)[0]), done: true});
 }
 
 /** Lowest velocity near that of the deck at which the peak of an impact reaches a force, as a sweep searches it. */
