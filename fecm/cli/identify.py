@@ -100,8 +100,8 @@ def identify_command(
     MEASURED.csv has the columns time and force (or load), which are converted to the deck's units
     if the file names its own.  Time 0 is the first contact, unless delay is fitted.  The deck's
     values are the start of the fit.  The exit status is 1 if the measurement does not determine the
-    parameters, the fit does not converge, the model does not describe the data, or a delay or an
-    offset should be fitted too.
+    parameters, the fit does not converge, the model does not describe the data, a delay or an
+    offset should be fitted too, or the full run of the fitted deck does not confirm it (NONL).
     """
     targets = OutputPaths(output or DASH, picture, overwrite, deck, measured)
     if page is not None:

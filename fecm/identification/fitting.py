@@ -18,11 +18,13 @@ from fecm.authoring.strike_values import Strike
 from fecm.authoring.values import check_names, strike_of_case
 from fecm.deck.model import Deck
 from fecm.identification.alignment import IdentifyError, contact_points
+from fecm.identification.corrections import NO_CORRECTIONS, Corrections
+from fecm.identification.plates import ExactPlate, force_after
 from fecm.mechanics.contact_law import Law
 from fecm.results.comparison import Measurement
 from fecm.studies.rod_test.filters import Filter
 from fecm.sweeps.impact_columns import impacts_from_cards
-from fecm.sweeps.outcome import Backend, Outcome
+from fecm.sweeps.outcome import About, Outcome
 
 DELAY = "delay"  # measured time at which the projectile touches the plate
 OFFSET = "offset"  # measured force without a contact
@@ -46,19 +48,25 @@ def fitted(deck: Deck, values: Mapping[str, float]) -> Strike:
     return strike_of_case(deck, case)
 
 
+def rounded(values: Mapping[str, float]) -> dict[str, float]:
+    """Return values with the digits of the fitted deck."""
+    return {name: float(f"{value:.5g}") for name, value in values.items()}
+
+
 class ForceModel(NamedTuple):
-    """Contact forces of a deck with trial values, computed from one response of the plate."""
+    """Contact forces of a deck with trial values, on one plate."""
 
     deck: Deck
-    backend: Backend
+    plate: ExactPlate
     sensor: Filter | None
     law: Law | None = None  # user's contact law, which replaces the law of the deck
     computed: Callable[[int], object] = lambda forces: None  # called with the number of forces
+    corrections: Corrections = NO_CORRECTIONS  # added to the forces of the plate
 
     def outcome(self, trials: Sequence[Strike], *, judged: bool) -> Outcome:
         """Compute impacts on the plate of the deck, under the law of this model."""
         impacts = impacts_from_cards(dict(enumerate(trials)), self.law)
-        return self.backend.outcomes(impacts, judged=judged)
+        return self.plate.outcomes(impacts, judged=judged)
 
     def histories(self, trials: Sequence[Mapping[str, float]]) -> tuple[Floats, Floats]:
         """Return the forces of trials, (times, trials), after their times.
@@ -66,25 +74,63 @@ class ForceModel(NamedTuple):
         The times start one duration of the run before the contact.
         """
         outcome = self.outcome([fitted(self.deck, trial) for trial in trials], judged=False)
-        assert outcome.force is not None
+        if outcome.force is None:  # a full run failed
+            raise IdentifyError(outcome.status[0])
         failed = np.flatnonzero(~np.isfinite(outcome.force).all(axis=1))
         if self.law is not None and len(failed):  # a judged run gives the reason
             judged = self.outcome([fitted(self.deck, trials[failed[0]])], judged=True)
             raise IdentifyError(str(judged.status[0]))
         self.computed(len(trials))
         steps = outcome.force.shape[1]
-        clock = float(outcome.columns["dt"][0]) * np.arange(-steps, steps + 1.0)
+        clock = float(outcome.columns[About.DT][0]) * np.arange(-steps, steps + 1.0)
         forces = np.vstack([np.zeros((steps + 1, len(trials))), outcome.force.T])
+        forces += self.corrections.at(clock, trials)
         return clock, forces if self.sensor is None else self.sensor(clock, forces)
+
+    def covering(self, duration: float) -> ForceModel:
+        """Return the model in runs of a duration, if that saves time."""
+        return self._replace(plate=self.plate.covering(duration))
+
+    def beside(self, deck: Deck) -> ForceModel:
+        """Return the model with the exact forces of another deck."""
+        plate = self.plate.like(deck)
+        return self._replace(deck=deck, plate=plate, corrections=NO_CORRECTIONS)
+
+    def corrected(self, values: Mapping[str, float], run: Outcome) -> ForceModel:
+        """Return the model with the force of a full run at its values."""
+        clock, difference = self.difference(values, run)
+        corrections = self.corrections._replace(clock=clock, difference=difference, place=values)
+        return self._replace(corrections=corrections)
+
+    def difference(self, values: Mapping[str, float], run: Outcome) -> tuple[Floats, Floats]:
+        """Return the difference of a full run from the force of the plate, after its times."""
+        plain = self._replace(sensor=None, corrections=NO_CORRECTIONS)
+        clock, force = plain.histories([values])
+        return clock, np.interp(clock, *force_after(run), right=0.0) - force[:, 0]
+
+    def of_run(self, time: Floats, values: Mapping[str, float], run: Outcome) -> Floats:
+        """Return the measured force, (times,), that a run with these values predicts."""
+        times, force = force_after(run)
+        clock = np.concatenate([-times[:0:-1], times])
+        forces = np.append(np.zeros(len(times) - 1), force)[:, None]
+        if self.sensor is not None:
+            forces = self.sensor(clock, forces)
+        return recorded(time, [values], clock, forces)[:, 0]
 
     def at(self, time: Floats, trials: Sequence[Mapping[str, float]]) -> Floats:
         """Return the measured forces that trial values predict, (times, trials)."""
-        clock, forces = self.histories(trials)
-        columns = [
-            trial.get(OFFSET, 0.0) + np.interp(time - trial.get(DELAY, 0.0), clock, force)
-            for trial, force in zip(trials, forces.T, strict=True)
-        ]
-        return np.column_stack(columns)
+        return recorded(time, trials, *self.histories(trials))
+
+
+def recorded(
+    time: Floats, trials: Sequence[Mapping[str, float]], clock: Floats, forces: Floats
+) -> Floats:
+    """Return the forces of trials, (clock, trials), in a record with their delays and offsets."""
+    columns = [
+        trial.get(OFFSET, 0.0) + np.interp(time - trial.get(DELAY, 0.0), clock, force)
+        for trial, force in zip(trials, forces.T, strict=True)
+    ]
+    return np.column_stack(columns)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,11 @@ from fecm._options import described_by, documented, option
 from fecm._table import html_summary
 from fecm._typing import Floats
 from fecm._watch import SILENT, StoppedError, Watch
-from fecm.authoring.strike_values import lacks_value, strike_of
+from fecm.authoring.strike_values import lacks_value
 from fecm.deck.model import Deck, Impact, Indentation, Projectile
 from fecm.deck.units import unit_names
 from fecm.identification.alignment import IdentifyError, check_measured, lags
+from fecm.identification.confirmation import Confirmed, beside_full_run, confirmed
 from fecm.identification.fitting import (
     DELAY,
     FIRST_EVALUATIONS,
@@ -36,6 +37,7 @@ from fecm.identification.fitting import (
     fit_parameters,
     fitted,
     parameter_bounds,
+    rounded,
     share_lost,
 )
 from fecm.identification.misfit import (
@@ -47,6 +49,7 @@ from fecm.identification.misfit import (
     sign_runs,
     undescribed,
 )
+from fecm.identification.plates import plate_of_fit
 from fecm.identification.result import CARDS, Identification
 from fecm.judge.end import PEAK_NOT_REACHED
 from fecm.judge.fits import (
@@ -70,8 +73,7 @@ from fecm.problem.problem import Problem
 from fecm.results.comparison import Measurement, Source, measurement_of
 from fecm.simulation.job import Price
 from fecm.studies.rod_test.filters import FILTERS, Filter, filter_of
-from fecm.sweeps.backends import ImpulseResponse, shares_plate
-from fecm.sweeps.outcome import Backend
+from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import check_law
 
 FREE = (*CARDS, *OF_RECORD)
@@ -91,6 +93,10 @@ class IdentificationJob:
     starts at several lags in turn. Standard errors hold for independent errors of the measured
     points, with the variance of the residual. Errors of the model come in addition;
     :attr:`Identification.plate_errors` has two of them.
+
+    The forces of a plate that stretches (NONL) come from the reduced model of sweeps. Full runs at
+    the fitted values correct them until the values settle; the last one confirms the fit
+    (:attr:`Identification.full_run`).
 
     Parameters
     ----------
@@ -172,15 +178,20 @@ class IdentificationJob:
 
     @cached_property
     def price(self) -> Price:
-        """What the fit takes. The time covers the plate's response and a usual number of forces."""
+        """What the fit takes.
+
+        The time covers the plate's response, a usual number of forces, and the full runs of a plate
+        that stretches.
+        """
         begin = time.perf_counter()
-        model = ForceModel(self.problem.deck, _shared_backend(self.problem.deck), None, self._law)
+        model = _model(self.problem.deck, None, self._law)
         model.histories([{}])
         first = time.perf_counter()
         model.histories([{}] * (len(self._free) + 1))
         each = time.perf_counter() - first
         memory = needed_bytes(self.problem, in_memory=False)
-        seconds = first - begin + USUAL_EVALUATIONS * each
+        impact = len({*self._free} - {*OF_RECORD})
+        seconds = first - begin + USUAL_EVALUATIONS * each + model.plate.seconds_of_runs(impact)
         return Price(self.problem.work.steps, 0, memory, seconds)
 
     def execute(self, watch: Watch = SILENT) -> Identification:
@@ -284,28 +295,6 @@ def identify(
     return fit
 
 
-@lru_cache(maxsize=4)
-def _shared_backend(deck: Deck) -> Backend:
-    """Return the back end that computes impacts from the response of the deck's plate."""
-    problem = sole_problem(deck, warns=False)
-    if words := problem.deck.nonlinear_words:
-        raise StudyError(
-            f"identify needs a linear plate, and the deck has {words}; fit a test at an energy "
-            "that leaves the deflection below a quarter of the plate's thickness, without NONL, on "
-            "supports that hold (fecm new --window held)"
-        )
-    if not shares_plate(problem):
-        loads = "FORC, EXCD, TANG, FORM and SOLV"
-        needed = f"impact steps (RODP) of one size, and a plate without {loads}"
-        raise StudyError(f"identify needs {needed}")
-    if problem.symmetry.lines:
-        raise StudyError(
-            "identify needs the whole plate, and the deck has lines of symmetry: a measured force "
-            "is that of the whole plate, mass and k are those of the part"
-        )
-    return ImpulseResponse(problem)
-
-
 def fit_deck(
     deck: Deck,
     measured: Measurement,
@@ -320,7 +309,7 @@ def fit_deck(
     """
     units = unit_names(deck)
     sensor = None if sensor is None else sensor.in_unit(units.get("time", ""))
-    model = ForceModel(deck, _shared_backend(deck), sensor, law, computed)
+    model = _model(deck, sensor, law, computed)
     clock, force = model.histories([{}])
     if sensor is not None:
         sensor.warn_without_effect(clock, units.get("time", ""))
@@ -331,10 +320,11 @@ def fit_deck(
     starts = lags(measured, clock, force[:, 0])
     depth = (force.max() / deck.require(Indentation).k) ** (2.0 / 3.0)
     sizes = {DELAY: width, OFFSET: UNIT_OFFSET * float(force.max()), "alpha_p": depth}
+    first = min(0.0, float(measured.time[0]), *starts)
+    model = model.covering(float(measured.time[-1]) - first + width)
+    model = beside_full_run(model)
 
-    def fit_from_starts(
-        names: Sequence[str], trial_model: ForceModel = model
-    ) -> FittedPoints | None:
+    def fit_from_starts(names: Sequence[str], trial_model: ForceModel) -> FittedPoints | None:
         """Return the best fit from all starts of the delay; None if the deck's run is too short."""
         start_values = {name: _start(deck, name) for name in names}
         trials = (
@@ -351,7 +341,7 @@ def fit_deck(
         points = fit_parameters(trial_model, measured, scalings[best], x, MOST_EVALUATIONS)
         return None if points is None or points.lost > LOST else points
 
-    points = fit_from_starts(free)
+    points = fit_from_starts(free, model)
     if points is None:
         lag = starts[0] if DELAY in free else 0.0
         if share_lost(measured.force, during_run(measured.time, clock, lag)) <= LOST:
@@ -360,40 +350,56 @@ def fit_deck(
             f"{measured.name}: {_explain_points_outside(free, starts[0], width, units)}"
         )
 
+    def fit_again(corrected: ForceModel, before: FittedPoints) -> FittedPoints | None:
+        """Return the fit of a corrected model from the values of a fit."""
+        return fit_parameters(corrected, measured, before.scaling, before.x, MOST_EVALUATIONS)
+
+    fit = confirmed(model, points, fit_again)
+    model, points = fit.model, fit.points
+
     def fit_with_filter(filter: Filter) -> FittedPoints | None:
         """Return the best fit with a filter of the measurement."""
         return fit_from_starts(free, model._replace(sensor=filter))
 
     fault, suspicion = proposal(
-        model, points, lambda: fit_from_starts([*free, DELAY]), fit_with_filter, units
+        model, points, lambda: fit_from_starts([*free, DELAY], model), fit_with_filter, units
     )
     fault = fault or undescribed(points, units)
     try:
         cov = covariance(points)
     except IdentifyError as error:
         raise IdentifyError(f"{fault}; besides, {error}" if fault else str(error)) from None
-    identification = _identification(model, measured, points, cov, fault)
+    identification = _identification(fit, measured, cov, fault)
     if not suspicion:
         return identification
     notes, doubts = identification.notes, identification.doubts
     return replace(identification, notes=(*notes, suspicion), doubts=(*doubts, suspicion))
 
 
+def _model(
+    deck: Deck,
+    sensor: Filter | None,
+    law: Law | None,
+    computed: Callable[[int], object] = lambda forces: None,
+) -> ForceModel:
+    """Return the forces of a deck, measured through a filter."""
+    plate = plate_of_fit(deck, replaces_law=law is not None)
+    return ForceModel(deck, plate, sensor, law, computed)
+
+
 def _identification(
-    model: ForceModel, measured: Measurement, points: FittedPoints, cov: Floats, fault: str
+    fit: Confirmed, measured: Measurement, cov: Floats, fault: str
 ) -> Identification:
     """Return the result of a fit; `fault` is the reason to reject it, or empty."""
+    model, points, outcome, full_run = fit
     deviation = np.sqrt(np.diagonal(cov))
     correlation = cov / np.outer(deviation, deviation)
     np.fill_diagonal(correlation, 1.0)
     values, start = points.values, points.scaling.start
     errors = deviation * points.scaling.slopes(points.x)
-    rounded = {name: float(f"{value:.5g}") for name, value in values.items()}
     plates = {}
     if not fault:
-        plates = plate_errors(
-            model, points, lambda deck: model._replace(deck=deck, backend=_shared_backend(deck))
-        )
+        plates = plate_errors(model, points, outcome)
     identification = Identification(
         values=values,
         errors=dict(zip(start, errors.tolist(), strict=True)),
@@ -403,14 +409,16 @@ def _identification(
         force=points.force,
         model=points.model,
         converged=points.converged,
-        accepted=points.converged and not fault,
+        accepted=points.converged and not (fault or fit.rejects),
         plate_errors=plates,
-        deck=fitted(model.deck, rounded).deck(),
+        deck=fitted(model.deck, rounded(values)).deck(),
         notes=(),
         law="" if model.law is None else law_name(model.law),
         record=measured.record,
+        full_run=full_run,
     )
-    doubts = tuple(filter(None, (fault, *measured.faults, *_doubts(identification, points, model))))
+    reasons = _doubts(identification, points, outcome)
+    doubts = tuple(filter(None, (fault, *measured.faults, *reasons)))
     remark = _points_left_out(identification, measured)
     if remark and points.lost > LEFT_OUT.value:
         doubts = (remark, *doubts)
@@ -466,7 +474,7 @@ def _points_left_out(fit: Identification, measured: Measurement) -> str:
     return LEFT_OUT.say(outside=outside, count=count)
 
 
-def _doubts(fit: Identification, solution: FittedPoints, model: ForceModel) -> Iterator[str]:
+def _doubts(fit: Identification, solution: FittedPoints, outcome: Outcome) -> Iterator[str]:
     """Yield reasons to doubt the values, from the fit and from the run of the fitted deck."""
     if not fit.converged:
         yield NOT_CONVERGED.say()
@@ -481,7 +489,8 @@ def _doubts(fit: Identification, solution: FittedPoints, model: ForceModel) -> I
         yield SHAPED.say(correlation=neighbour_correlation(fit.residual))
     elif has_few_sign_runs(solution):
         yield FEW_RUNS.say(rarity=-sign_runs(fit.residual))
-    outcome = model.outcome([strike_of(fit.deck)], judged=True)
+    if fit.full_run is not None:
+        yield fit.full_run.doubt
     if not outcome.fine[0]:
         yield FAILED_RUN.say(why=outcome.status[0])
     # The measurement may end in contact. Other limits of the model bias the parameters.

@@ -11,8 +11,9 @@ import numpy as np
 from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.authoring.case import Case
+from fecm.authoring.time_values import step_of
 from fecm.authoring.values import apply_case
-from fecm.deck.model import Deck, Material
+from fecm.deck.model import Material
 from fecm.deck.units import unit_of
 from fecm.identification.fitting import (
     DELAY,
@@ -21,6 +22,7 @@ from fecm.identification.fitting import (
     FittedPoints,
     ForceModel,
     join_names,
+    recorded,
 )
 from fecm.judge.fits import (
     COLOURED,
@@ -32,6 +34,7 @@ from fecm.judge.fits import (
     UNDESCRIBED,
 )
 from fecm.studies.rod_test.filters import Filter, FilterKind
+from fecm.sweeps.outcome import Outcome
 
 RISES = np.geomspace(3e-3, 0.3, 14)  # rise times that are tried, over the time of the contact
 FINER = 7  # rise times around the best one, which are tried next
@@ -199,10 +202,14 @@ def _find_filter(
     top = points.time[points.model > 0.5 * points.model.max()]
     width = float(np.ptp(top)) if len(top) else 0.0
 
+    clock, forces = model.histories([points.values])
+
     def remaining_squares(rise: float) -> float:
         """Return the sum of squares of the linearised fit with a filter."""
-        filtered_model = model._replace(sensor=Filter(FilterKind.FIRST_ORDER, rise))
-        residual = points.force - filtered_model.at(points.time, [points.values])[:, 0]
+        filtered_forces = Filter(FilterKind.FIRST_ORDER, rise)(clock, forces)
+        residual = (
+            points.force - recorded(points.time, [points.values], clock, filtered_forces).ravel()
+        )
         x = np.linalg.lstsq(points.jacobian, residual, rcond=None)[0]
         return float(((residual - points.jacobian @ x) ** 2).sum())
 
@@ -295,30 +302,32 @@ def _force_without_contact(model: ForceModel, points: FittedPoints) -> float:
 
 
 def plate_errors(
-    model: ForceModel, points: FittedPoints, runs: Callable[[Deck], ForceModel]
+    model: ForceModel, points: FittedPoints, run: Outcome
 ) -> dict[str, dict[str, float]]:
     """Return the changes of the fitted values for a plate with 1 % more thickness or E1.
 
-    The fit is linearised. `runs` returns the model of a changed deck. A property is left out if the
-    changed plate can't be run with the time step of the deck.
+    The fit is linearised. `run` has the fitted values. A property is left out if the changed plate
+    can't be run with the time step of the deck.
     """
+    if not run.fine[0]:
+        return {}
     material = model.deck.require(Material)
     properties = {
         "thickness": sum(layer.thickness for layer in material.layers),
         "e1": material.ply.e1,
     }
-    clock, _ = model.histories([points.values])
-    dt = float(clock[len(clock) // 2 + 1])  # the first time after 0
+    dt = step_of(model.plate.problem)
+    before = model.of_run(points.time, points.values, run)
     errors: dict[str, dict[str, float]] = {}
     for name in PROPERTIES:
         for change in (CHANGED, -CHANGED):  # one of the two plates may be unstable
             try:
                 case: Case = {name: (1.0 + change) * properties[name], "dt": dt}
-                changed = runs(apply_case(model.deck, case))
+                changed = model.beside(apply_case(model.deck, case))
                 force = changed.at(points.time, [points.values])[:, 0]
             except FecmError:
                 continue
-            x = np.linalg.lstsq(points.jacobian, points.model - force, rcond=None)[0]
+            x = np.linalg.lstsq(points.jacobian, before - force, rcond=None)[0]
             changes = PERCENT / change * points.scaling.slopes(points.x) * x
             errors[name] = dict(zip(points.scaling.start, changes.tolist(), strict=True))
             break

@@ -14,6 +14,7 @@ from fecm._typing import Floats
 from fecm.authoring.values import dimension_of
 from fecm.deck.model import Deck, Impact, Indentation, Projectile
 from fecm.deck.units import quantity, readable, unit_names, unit_of
+from fecm.identification.confirmation import FullRun
 from fecm.identification.fitting import OF_RECORD
 from fecm.judge.fits import Verdict, verdict_of
 from fecm.results.groups import NotStoredError
@@ -60,6 +61,9 @@ class Identification(Reported):
         same.
     record : Record
         Name and SHA-256 (`file`, `sha256`) of the file of the measurement; empty texts for arrays.
+    full_run : FullRun or None
+        Full run of the fitted deck beside the fitted force, where the reduced model computed the
+        trial forces (NONL).
     """
 
     values: dict[str, float]
@@ -77,6 +81,7 @@ class Identification(Reported):
     doubts: tuple[str, ...] = ()
     law: str = ""
     record: Record = IN_MEMORY
+    full_run: FullRun | None = None
 
     @property
     def verdict(self) -> Verdict:
@@ -150,6 +155,7 @@ class Identification(Reported):
             "accepted": self.accepted,
             "verdict": self.verdict,
             "plate_errors": self.plate_errors,
+            **({} if self.full_run is None else {"full_run": self.full_run._asdict()}),
             "notes": list(self.notes),
             "cards": self.cards(),
         }
@@ -208,9 +214,19 @@ def _quality(fit: Identification) -> Table:
     ]
     if fit.law:
         rows.append(("law", f"{fit.law}, instead of EXPE"))
+    if fit.full_run is not None:
+        rows += _full_run_rows(fit.full_run)
     if fit.record.file:
         rows.append(("record", str(fit.record)))
     return Table(tuple(rows), title="Fit")
+
+
+def _full_run_rows(run: FullRun) -> Iterator[Row]:
+    """Yield how the fitted force differs from the full run of the fitted deck."""
+    difference = f"peak {run.peak:+.2%}, rms {run.misfit:.2%} of the peak"
+    yield ("full run", f"difference of the fitted force: {difference}")
+    alone = f"without full runs its peak differs by {run.alone:+.1%}"
+    yield ("reduced model", f"{run.modes} modes of bending; {alone}")
 
 
 def _value_row(fit: Identification, name: str) -> Row:

@@ -74,6 +74,20 @@ LEFT_OUT = ModelLimit(
     note="{outside} of {count} points are outside the run of the deck and left out",
 )
 FAILED_RUN = ModelLimit("run of the fitted deck", note="the run of the fitted deck fails: {why}")
+# Largest difference of the fitted force from the full run of the fitted deck, over the peak.
+UNCONFIRMED = ModelLimit(
+    "difference from the full run",
+    0.02,
+    note="the fitted force, of {modes} bending modes, differs by up to {largest} of the peak from "
+    "the full run of the fitted deck",
+    remedy="start from better values in the deck, or fit fewer parameters",
+    level=TrustLevel.OUTSIDE,
+)
+UNSETTLED = ModelLimit(
+    "effect of the full run",
+    note="after {fits} fits beside full runs another would change the values by up to {effect} "
+    "standard errors",
+)
 DOUBTFUL_RUN = ModelLimit(
     "run of the fitted deck",
     note="the run of the fitted deck is {doubts}: the parameters make up for what it lacks",

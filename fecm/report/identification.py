@@ -9,7 +9,7 @@ from fecm._table import Row, ShownNumber
 from fecm._text import FITTED_DIGITS
 from fecm.deck.units import prefixed, uncertain, unit_names, unit_of
 from fecm.identification.result import Identification, identification_tables
-from fecm.judge.fits import NOT_CONVERGED, VERDICTS
+from fecm.judge.fits import NOT_CONVERGED, UNCONFIRMED, VERDICTS
 from fecm.judge.limits import Judgement, TrustLevel
 from fecm.plot.histories import force_fit_picture
 from fecm.report.content import (
@@ -82,6 +82,9 @@ def _judgements(fit: Identification) -> Iterator[Judgement]:
         TrustLevel.UNJUDGED, "residual, rms", number_with_unit(fit.rms, force), "noise and model"
     )
     yield Judgement(TrustLevel.UNJUDGED, "residual of the peak", share(fit.share))
+    if (run := fit.full_run) is not None:
+        words = f"rms {run.misfit:.2%}; {run.modes} modes of bending beside full runs"
+        yield UNCONFIRMED.judgement(share(run.largest), beyond=run.rejects, words=words)
     count = len(fit.time)
     words = f"{fit.dof} degrees of freedom"
     yield Judgement(TrustLevel.UNJUDGED, "points", ShownNumber(count, str(count)), words)

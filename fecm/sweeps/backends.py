@@ -7,7 +7,7 @@ response. A nonlinear plate is run in full for each impact, or reduced to some b
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._machine import require_memory
-from fecm._typing import Floats
+from fecm._typing import Floats, Indices
 from fecm.authoring.time_values import lengthened
 from fecm.deck.macros import flat
 from fecm.judge.limits import ENERGY_BALANCE
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import HystereticLaw, Law
 from fecm.mechanics.own_law import CaseByCase
+from fecm.mechanics.reduced_plate import ReducedPlate
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_model
 from fecm.problem.problem import Problem
@@ -129,6 +130,9 @@ class BendingModes:
     measures: Sequence[Measure]
     modes: int
     history: bool = True
+    # Halvings of the time step of all impacts, at least; None if each has as many as it needs.
+    halvings: int | None = None
+    reduced: ReducedPlate | None = None  # the plate, if it is reduced already
     longer_than: BendingModes | None = None  # the same plate in the program of the deck
     has_fields: bool = True  # without displacement fields, no outcome can be judged
     computes_together = False  # a search would try velocities far beyond the model
@@ -146,6 +150,8 @@ class BendingModes:
     @cached_property
     def plate(self) -> ReducedImpacts:
         """Impacts on the reduced plate; CasesError if it can't be reduced."""
+        if self.reduced is not None:
+            return impacts_on(self.reduced, self.problem)
         if self.longer_than is not None:
             return impacts_on(self.longer_than.plate.plate, self.problem)
         return reduced(self.problem, self.modes, has_fields=self.has_fields)
@@ -162,7 +168,7 @@ class BendingModes:
     def outcomes(self, impacts: Impacts, *, judged: bool = True) -> Outcome:
         """Compute impacts, together if their time steps are halved as often."""
         parts = []
-        for times, rows in by_halvings(self.plate, impacts).items():
+        for times, rows in self._by_halvings(impacts).items():
             plate = ReducedResponse(self.plate.halved(times), self.recovery if judged else None)
             for some in np.array_split(rows, math.ceil(len(rows) / plate.most_cases)):
                 parts.append(
@@ -176,6 +182,13 @@ class BendingModes:
                     )
                 )
         return merge(parts, history=self.history)
+
+    def _by_halvings(self, impacts: Impacts) -> Mapping[int, Indices]:
+        """Group rows of impacts by the halvings of their time step."""
+        groups = by_halvings(self.plate, impacts)
+        if self.halvings is None:
+            return groups
+        return {max(self.halvings, *groups): np.arange(len(impacts))}
 
     def lengthened(self, factor: float) -> BendingModes:
         """Return the back end of a run `factor` times as long."""

@@ -1,0 +1,161 @@
+"""Plates of fits: linear ones, whose forces are exact, and ones that stretch, in bending modes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import ClassVar, Self
+
+import numpy as np
+
+from fecm._errors import StudyError
+from fecm._typing import Floats
+from fecm.authoring.time_values import duration_of
+from fecm.deck.model import Deck
+from fecm.problem.loading import sole_problem
+from fecm.problem.problem import Problem
+from fecm.results.sinks import MemorySink
+from fecm.simulation.run import seconds_of_steps
+from fecm.sweeps.backends import BendingModes, FullRuns, ImpulseResponse, only_impacts
+from fecm.sweeps.impact_columns import Impacts
+from fecm.sweeps.in_full import motion
+from fecm.sweeps.outcome import About, Backend, Outcome
+from fecm.sweeps.reduced import MODES
+
+USUAL_RUNS = 5  # of the deck and of fitted decks, and those of the errors of the plate
+EXACT = 0.01  # error of the factor of the flexibility
+
+
+@dataclass(frozen=True)
+class ExactPlate:
+    """Plate whose trial forces are those of full runs."""
+
+    problem: Problem
+    backend: Backend
+    modes: ClassVar[int] = 0  # bending modes of the trial forces
+    is_exact: ClassVar[bool] = True
+
+    def outcomes(self, impacts: Impacts, *, judged: bool) -> Outcome:
+        """Compute impacts."""
+        return self.backend.outcomes(impacts, judged=judged)
+
+    def covering(self, duration: float) -> Self:
+        """Return the plate in runs of a duration, if that saves time."""
+        return self
+
+    def following(self, impact: Impacts, run: Outcome) -> Self:
+        """Return the plate with the force nearest to that of a full run."""
+        return self
+
+    def like(self, deck: Deck) -> ExactPlate:
+        """Return the plate of another deck, in runs as long as here."""
+        return plate_of_fit(deck)
+
+    def seconds_of_runs(self, parameters: int) -> float:
+        """Return the seconds of the full runs of a fit of some parameters."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class ModalPlate(ExactPlate):
+    """Plate that stretches: trial forces by the reduced model, judged impacts by full runs."""
+
+    backend: BendingModes
+    share: float = 1.0  # duration of the runs, over that of the program
+    softness: float = 1.0  # flexibility of the omitted modes, over that at rest
+    modes: ClassVar[int] = MODES
+    is_exact: ClassVar[bool] = False
+
+    def outcomes(self, impacts: Impacts, *, judged: bool) -> Outcome:
+        """Compute impacts; if judged, in full."""
+        backend: Backend = self._full_runs if judged else self._trials
+        return backend.outcomes(impacts, judged=judged)
+
+    @cached_property
+    def _full_runs(self) -> FullRuns:
+        return FullRuns(self.problem).lengthened(self.share)
+
+    @cached_property
+    def _trials(self) -> BendingModes:
+        plate = self.backend.plate.plate
+        softened = replace(plate, flexibility=self.softness * plate.flexibility)
+        return replace(self.backend.lengthened(self.share), reduced=softened)
+
+    def covering(self, duration: float) -> Self:
+        """Return the plate in runs of a duration; a program with OVER has steps for longer ones."""
+        if not self.problem.work.at_most:
+            return self
+        return replace(self, share=min(1.0, duration / duration_of(self.problem)))
+
+    def following(self, impact: Impacts, run: Outcome) -> Self:
+        """Return the plate with the force nearest to that of a full run.
+
+        The reduced model has the omitted modes as a linear spring. In a plate that stretches, the
+        membrane stiffens them.
+        """
+        from scipy.optimize import minimize_scalar  # takes 0.2 s to import
+
+        clock, in_full = force_after(run)
+
+        def misfit(softness: float) -> float:
+            times, force = force_after(
+                replace(self, softness=softness).outcomes(impact, judged=False)
+            )
+            return float(np.mean((force - np.interp(times, clock, in_full, right=0.0)) ** 2))
+
+        best = minimize_scalar(misfit, bounds=(0.0, 1.0), options={"xatol": EXACT})
+        return replace(self, softness=float(best.x))
+
+    def like(self, deck: Deck) -> ExactPlate:
+        """Return the plate of another deck, in full runs as long as here."""
+        problem = sole_problem(deck, warns=False)
+        return ExactPlate(problem, FullRuns(problem).lengthened(self.share))
+
+    def seconds_of_runs(self, parameters: int) -> float:
+        """Return the seconds of the full runs of a fit of some parameters, from some steps."""
+        before, step = seconds_of_steps(
+            lambda observer: motion([self.problem], MemorySink(), (), observers=[observer])
+        )
+        return (USUAL_RUNS + parameters) * (before + step * self.problem.work.steps)
+
+
+def force_after(run: Outcome) -> tuple[Floats, Floats]:
+    """Return times from 0 on, and the force of an outcome of one case."""
+    assert run.force is not None
+    (force,) = run.force
+    dt = float(run.columns[About.DT][0])
+    return dt * np.arange(len(force) + 1.0), np.append(0.0, force)
+
+
+@lru_cache(maxsize=4)
+def plate_of_fit(deck: Deck, *, replaces_law: bool = False) -> ExactPlate:
+    """Return the plate of a deck.
+
+    `replaces_law` says that a user's contact law replaces EXPE. Raises StudyError if impacts of the
+    deck can't be fitted.
+    """
+    problem = sole_problem(deck, warns=False)
+    if problem.plate.lifts:
+        raise StudyError(
+            "identify needs supports that hold, and the deck has UNIL, from which the plate lifts "
+            "off: fit the test on supports that hold (fecm new --window held)"
+        )
+    if not only_impacts(problem):
+        loads = "FORC, EXCD, TANG, FORM and SOLV"
+        needed = f"impact steps (RODP) of one size, and a plate without {loads}"
+        raise StudyError(f"identify needs {needed}")
+    if problem.symmetry.lines:
+        raise StudyError(
+            "identify needs the whole plate, and the deck has lines of symmetry: a measured force "
+            "is that of the whole plate, mass and k are those of the part"
+        )
+    if deck.is_linear:
+        return ExactPlate(problem, ImpulseResponse(problem))
+    if replaces_law:
+        raise StudyError(
+            "the contact law takes the place of EXPE, which the reduced model of a plate that "
+            "stretches (NONL) needs: leave out the law, or NONL"
+        )
+    # With time steps of one size the forces are smooth functions of the trial values.
+    modes = BendingModes(problem, (), MODES, has_fields=False, halvings=1)
+    return ModalPlate(problem, modes)
