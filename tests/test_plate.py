@@ -325,3 +325,17 @@ def test_a_family_holds_the_elements_that_have_the_same_nodes() -> None:
         for row, nodes in zip(family.rows, family.nodes, strict=True):
             assert np.array_equal(elements[row] > 0, family.present)
             assert np.array_equal(elements[row][elements[row] > 0], nodes + 1)
+
+
+def test_a_matrix_of_many_slabs_has_the_bits_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    coordinates, elements = distorted_square(7, 5)
+    restrained = with_restraints(coordinates, elements, boundary(coordinates, elements))
+    model = PlateModel(restrained, general_plate(), rules())
+    monkeypatch.setattr(plate, "BLOCK", 4)
+    whole = model.assembled(model.stiffness_of)
+    monkeypatch.setattr(plate, "SLAB", 16)
+    actual = model.assembled(model.stiffness_of)
+    assert model.neq > 20 * plate.SLAB
+    for part in ("data", "indices", "indptr"):
+        np.testing.assert_array_equal(getattr(actual, part), getattr(whole, part))
+    assert actual.shape == whole.shape

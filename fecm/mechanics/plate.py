@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
 # Upper bound of the bytes that assembly needs per entry of the element matrices.
 ASSEMBLED = 24
+# Rows of the assembled matrix that are added to together.
+SLAB = 16_384
 # Number of element matrices in memory at the same time.
 BLOCK = 1024
 
@@ -253,14 +255,25 @@ class PlateModel:
 
         neq, ndof = self.neq, self._numbers.size
         require_memory(ASSEMBLED * self.entries, "to assemble the plate's matrices")
-        total = sparse.csr_array((neq, ndof))
+        # A sum costs as much as both of its matrices: a block is added to the slabs of its rows.
+        starts = range(0, neq, SLAB)
+        slabs = [sparse.csr_array((min(SLAB, neq - start), ndof)) for start in starts]
         for dofs, matrices in self._element_matrices(matrices_of, weights):
             rows = np.broadcast_to(dofs[:, :, None], matrices.shape)
             columns = np.broadcast_to(dofs[:, None, :], matrices.shape)
             stored = (rows < neq) & (matrices != 0.0)
-            entries = matrices[stored], (rows[stored], columns[stored])
-            total = total + sparse.coo_array(entries, shape=(neq, ndof))
-        total = total.tocsr()
+            values = matrices[stored]
+            row, column = (part[stored].astype(np.int32) for part in (rows, columns))
+            slab = row // SLAB
+            if len(slab) and slab.min() != slab.max():
+                order = np.argsort(slab, kind="stable")
+                row, column, values, slab = row[order], column[order], values[order], slab[order]
+            numbers = np.unique(slab)
+            cuts = [*np.searchsorted(slab, numbers).tolist(), len(slab)]
+            for number, cut in zip(numbers.tolist(), map(slice, cuts, cuts[1:]), strict=False):
+                entries = values[cut], (row[cut] - number * SLAB, column[cut])
+                slabs[number] = slabs[number] + sparse.coo_array(entries, slabs[number].shape)
+        total = sparse.vstack(slabs, format="csr") if slabs else sparse.csr_array((neq, ndof))
         total.sort_indices()
         return total
 
