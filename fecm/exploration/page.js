@@ -223,7 +223,7 @@ function row({group, name, label, ends, scatter}) {
 
 // Worker --------------------------------------------------------------------------------------------------------
 
-let worker, asked = 0, now;
+let worker, asked = 0, now, frame = null;
 const shown = {number: 0, plate: 0, found: null, range: [], curve: null, draws: null, extended: false, done: false};
 
 /** Ask the worker for the state of the sliders; what is shown stays until the answer is there. */
@@ -240,8 +240,7 @@ function answered({data: answer}) {
   if (answer.pins) answer.pins.forEach((result, n) => { state.pins[n].result = result; });
   else Object.assign(shown, {done: false}, answer);
   now = shown.now;
-  if (now) draw();
-  pending();
+  frame ??= requestAnimationFrame(() => { frame = null; if (now) draw(); pending(); });
 }
 
 function pending() {
