@@ -206,6 +206,8 @@ class PlateModel:
     def families(self) -> list[ElementBlock]:
         """Elements in blocks with the same nodes present and the same laminate."""
         mesh = self.mesh
+        if self.laminate_numbers is None:  # plates on one mesh share boxes and congruence
+            return mesh.families
         return element_blocks(mesh.elements, mesh.coordinates, self.laminate_numbers)
 
     def stiffness_of(self, family: ElementBlock) -> Floats:

@@ -302,8 +302,12 @@ class Problem:
         """Distance of the centre of every element from the load, (numel,); 0 without a load."""
         if self.load_place is None:
             return np.zeros(len(self.mesh.elements))
-        centres = element_centres(self.mesh.elements, self.mesh.coordinates)
-        return np.asarray(np.hypot(*(centres - self.load_place).T))
+        return np.asarray(np.hypot(*(self._centres - self.load_place).T))
+
+    @cached_property
+    def _centres(self) -> Floats:
+        """Mean of the corners of every element, (numel, 2)."""
+        return element_centres(self.mesh.elements, self.mesh.coordinates)
 
     @property
     def reach_of_load(self) -> float:
@@ -327,8 +331,7 @@ class Problem:
     @cached_property
     def under_load_by_centre(self) -> Bools:
         """Whether plate theory does not hold at the centre of each element, (numel,)."""
-        centres = element_centres(self.mesh.elements, self.mesh.coordinates)
-        return self.under_load(*centres.T)
+        return self.under_load(*self._centres.T)
 
     @cached_property
     def inner_corners(self) -> Floats:
