@@ -254,7 +254,7 @@ def _list(contents: FileContents, file_size: int, name: str, item: Any) -> None:
         contents.shapes[name], contents.dtypes[name] = shape, np.dtype(object)
     elif dtype.kind in "biuf" and shape is not None and not dtype.shape:
         contents.shapes[name] = tuple(map(int, shape))
-        contents.dtypes[name] = doubles(np.empty(0, dtype.newbyteorder("="))).dtype
+        contents.dtypes[name] = dtype.newbyteorder("=")
     else:
         references = h5py.check_ref_dtype(dtype) is not None
         what = "references; they are not followed" if references else "neither numbers nor a text"
