@@ -243,3 +243,18 @@ def test_corrections_are_those_of_the_run_and_linear_beside_it() -> None:
     assert corrections.at(clock, beside) == pytest.approx(expected)
     between = corrections.at(np.array([0.125]), [place])[0, 0]
     assert between == pytest.approx(difference(place)[:2].mean())
+
+
+def test_a_later_run_corrects_the_derivatives_in_its_direction_alone() -> None:
+    clock, shape = np.linspace(0.0, 1.0, 5), np.sin(np.linspace(0.0, 3.0, 5))
+    sizes = {"k": 1000.0, "velocity": 50.0}
+    slopes = {"k": 1e-3 * shape, "velocity": -0.2 * shape}
+    earlier = Corrections(clock, 7.0 * shape, {"k": 900.0, "velocity": 45.0}, slopes)
+    place = {"k": 1000.0, "velocity": 50.0}
+    later = Corrections(clock, 2.0 * shape, place, slopes).meeting(earlier, sizes)
+    for run in (earlier, later):
+        assert later.at(clock, [run.place])[:, 0] == pytest.approx(run.difference)
+    # Both values changed by a tenth: a change of one up and of the other down is across.
+    across = {"k": 1100.0, "velocity": 45.0}
+    assert later.at(clock, [across])[:, 0] == pytest.approx((2.0 + 0.1 + 1.0) * shape)
+    assert later.meeting(later, sizes) is later

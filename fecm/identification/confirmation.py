@@ -2,8 +2,10 @@
 
 The difference between full runs and the reduced model, linear in the parameters, is added to the
 forces of the model, and the parameters are fitted again (N. M. Alexandrov and R. M. Lewis,
-Optimization and Engineering 2, 2001, 413: first-order consistency). Near the last full run, force
-and derivatives are then those of full runs, and so are the standard errors.
+Optimization and Engineering 2, 2001, 413: first-order consistency). Near the full runs, force and
+derivatives are then those of full runs, and so are the standard errors. Full runs beside the first
+fit give the derivatives, and each later one corrects them (C. G. Broyden, Mathematics of
+Computation 19, 1965, 577).
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ from fecm.sweeps.outcome import Outcome
 SETTLED, SAME = 0.2, 1e-4
 # Change of a scaled parameter for the derivative of full runs.
 BESIDE = 2e-3
-MOST_FITS = 4  # of a corrected model
+MOST_FITS = 6  # of a corrected model
 
 
 class FullRun(NamedTuple):
@@ -126,11 +128,16 @@ def confirmed(
         if model.plate.is_exact or not outcome.fine[0]:
             return Confirmed(model, points, outcome)
         full_run = _compared(model, points, outcome, fits)
-        is_last = fits == MOST_FITS or (fits > 0 and full_run.is_settled)
+        if fits == MOST_FITS or (fits and full_run.is_settled):
+            return Confirmed(model, points, outcome, full_run)
         corrected = model.corrected(points.values, outcome)
-        if not is_last:
+        if fits:
+            sizes = dict(zip(points.values, points.scaling.slopes(points.x).tolist(), strict=True))
+            corrections = corrected.corrections.meeting(model.corrections, sizes)
+            corrected = corrected._replace(corrections=corrections)
+        else:
             corrected = _with_slopes(corrected, points)
-        again = None if is_last else fit_again(corrected, points)
+        again = fit_again(corrected, points)
         if again is None:
             return Confirmed(model, points, outcome, full_run)
         model, points, fits = corrected, again, fits + 1

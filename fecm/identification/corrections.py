@@ -31,5 +31,24 @@ class Corrections(NamedTuple):
             columns.append(np.interp(clock, self.clock, difference))
         return np.stack(columns, axis=1)
 
+    def meeting(self, earlier: Corrections, sizes: Mapping[str, float]) -> Corrections:
+        """Return the corrections with slopes that give the difference of an earlier run, too.
+
+        The slopes change as little as possible, per `sizes` of the parameters.
+        """
+        away = {
+            name: (earlier.place[name] - self.place[name]) / sizes[name] for name in self.slopes
+        }
+        square = sum(part**2 for part in away.values())
+        if not square:
+            return self
+        difference = np.interp(self.clock, earlier.clock, earlier.difference)
+        missing = difference - self.at(self.clock, [earlier.place])[:, 0]
+        slopes = {
+            name: slope + missing * (away[name] / (square * sizes[name]))
+            for name, slope in self.slopes.items()
+        }
+        return self._replace(slopes=slopes)
+
 
 NO_CORRECTIONS = Corrections()
