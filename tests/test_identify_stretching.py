@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from fecm._errors import StudyError
 from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_names
 from fecm.identification import confirmation
-from fecm.identification.corrections import Corrections
+from fecm.identification.expansion import Expansion
 from fecm.identification.fitting import FittedPoints, ForceModel, Scaling, fit_parameters
 from fecm.identification.identify import IdentificationJob
 from fecm.identification.plates import ExactPlate
@@ -189,15 +190,14 @@ def test_the_difference_from_the_full_run_is_in_summary_json_and_page() -> None:
 def test_a_fit_that_the_full_run_does_not_confirm_is_rejected(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    signs = itertools.cycle([1.0, -1.0])
+    signs, at = itertools.cycle([1.0, -1.0]), Expansion.at
 
-    def other_force(self: ForceModel, *_: object) -> tuple[Floats, Floats]:
-        """Differences of full runs that do not hold for the next one."""
-        clock, force = self._replace(corrections=Corrections(), sensor=None).histories([{}])
-        return clock, 0.03 * next(signs) * force[:, 0]
+    def other_force(self: Expansion, trials: Sequence[Mapping[str, float]]) -> Floats:
+        """Forces that do not hold at the next values."""
+        return at(self, trials) * (1.0 + 0.03 * next(signs))
 
-    monkeypatch.setattr(ForceModel, "difference", other_force)
-    monkeypatch.setattr(confirmation, "_with_slopes", lambda model, points: model)
+    monkeypatch.setattr(Expansion, "at", other_force)
+    monkeypatch.setattr(confirmation, "MOST_FITS", 1)
     (tmp_path / "d.inp").write_text(coupon().to_text())
     table = np.array([TIME, 1.1 * measured(0)]).T
     np.savetxt(tmp_path / "m.csv", table, delimiter=",", header="time,force", comments="")
@@ -225,36 +225,16 @@ def test_what_a_reduced_plate_does_not_have_is_refused_with_the_remedy() -> None
         fecm.identify(lifting, TIME, true_force(), ["velocity"])
 
 
-# Corrections by full runs ------------------------------------------------------------------------
+# Forces near a full run --------------------------------------------------------------------------
 
 
-def test_corrections_are_those_of_the_run_and_linear_beside_it() -> None:
-    clock, shape = np.linspace(0.0, 1.0, 5), np.sin(np.linspace(0.0, 3.0, 5))
-    place = {"k": 1000.0, "velocity": 50.0}
+def test_forces_near_a_full_run_are_linear_in_the_values_of_the_impact() -> None:
+    times, shape = np.linspace(0.0, 1.0, 5), np.sin(np.linspace(0.0, 3.0, 5))
+    place = {"k": 1000.0, "velocity": 50.0, "delay": 2.0}
 
-    def difference(values: dict[str, float]) -> Floats:
-        return (3.0 + 1e-3 * values["k"] - 0.2 * values["velocity"]) * shape
+    def force(values: Mapping[str, float]) -> Floats:
+        return np.asarray((3.0 + 1e-3 * values["k"] + 0.2 * values["velocity"]) * shape)
 
-    assert not Corrections().at(clock, [place]).any()
-    slopes = {"k": 1e-3 * shape, "velocity": -0.2 * shape}
-    corrections = Corrections(clock, difference(place), place, slopes)
-    beside = [place, {"k": 1300.0, "velocity": 47.0, "delay": 1.0}, {"k": 900.0, "velocity": 50.0}]
-    expected = np.stack([difference(values) for values in beside], axis=1)
-    assert corrections.at(clock, beside) == pytest.approx(expected)
-    between = corrections.at(np.array([0.125]), [place])[0, 0]
-    assert between == pytest.approx(difference(place)[:2].mean())
-
-
-def test_a_later_run_corrects_the_derivatives_in_its_direction_alone() -> None:
-    clock, shape = np.linspace(0.0, 1.0, 5), np.sin(np.linspace(0.0, 3.0, 5))
-    sizes = {"k": 1000.0, "velocity": 50.0}
-    slopes = {"k": 1e-3 * shape, "velocity": -0.2 * shape}
-    earlier = Corrections(clock, 7.0 * shape, {"k": 900.0, "velocity": 45.0}, slopes)
-    place = {"k": 1000.0, "velocity": 50.0}
-    later = Corrections(clock, 2.0 * shape, place, slopes).meeting(earlier, sizes)
-    for run in (earlier, later):
-        assert later.at(clock, [run.place])[:, 0] == pytest.approx(run.difference)
-    # Both values changed by a tenth: a change of one up and of the other down is across.
-    across = {"k": 1100.0, "velocity": 45.0}
-    assert later.at(clock, [across])[:, 0] == pytest.approx((2.0 + 0.1 + 1.0) * shape)
-    assert later.meeting(later, sizes) is later
+    expansion = Expansion(times, force(place), place, {"k": 1e-3 * shape, "velocity": 0.2 * shape})
+    beside = [place, place | {"k": 1300.0, "delay": 1.0}, place | {"k": 900.0, "velocity": 47.0}]
+    assert expansion.at(beside) == pytest.approx(np.stack([force(v) for v in beside], axis=1))

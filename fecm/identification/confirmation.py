@@ -1,22 +1,23 @@
 """Full runs beside a fit by the reduced model: they correct its forces and confirm the values.
 
-The difference between full runs and the reduced model, linear in the parameters, is added to the
-forces of the model, and the parameters are fitted again (N. M. Alexandrov and R. M. Lewis,
-Optimization and Engineering 2, 2001, 413: first-order consistency). Near the full runs, force and
-derivatives are then those of full runs, and so are the standard errors. Full runs beside the first
-fit give the derivatives, and each later one corrects them (C. G. Broyden, Mathematics of
-Computation 19, 1965, 577).
+The run of the deck corrects the reduced model for the first fit. At the fitted values full runs
+give the force and its derivatives, which take the place of the model: the parameters are fitted
+again to a force that is linear in the values of the impact (Gauss-Newton iteration), until the
+values settle. So the values and their standard errors are those of full runs, and the last full run
+has the values of the fitted deck.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from fecm.identification.corrections import NO_CORRECTIONS
+from fecm._typing import Floats
+from fecm.identification.expansion import Expansion
 from fecm.identification.fitting import (
     OF_RECORD,
     OFFSET,
@@ -24,16 +25,18 @@ from fecm.identification.fitting import (
     ForceModel,
     fitted,
 )
+from fecm.identification.plates import force_after
 from fecm.judge.fits import UNCONFIRMED, UNSETTLED
 from fecm.sweeps.impact_columns import impacts_from_cards
-from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.outcome import About, Outcome
 
 # Effect of a full run on the values, in standard errors, and its difference from the fitted force,
 # over the peak, below which the values are settled.
-SETTLED, SAME = 0.2, 1e-4
+SETTLED, SAME = 0.1, 1e-4
 # Change of a scaled parameter for the derivative of full runs.
 BESIDE = 2e-3
-MOST_FITS = 6  # of a corrected model
+FALLS = 0.5  # effect of a full run, over that of the run before, above which a step is halved
+MOST_FITS = 6  # to forces near full runs
 
 
 class FullRun(NamedTuple):
@@ -42,9 +45,9 @@ class FullRun(NamedTuple):
     Attributes
     ----------
     modes : int
-        Bending modes of the reduced model, which computed the trial forces.
+        Bending modes of the reduced model, which computed the forces of the first fit.
     fits : int
-        Number of fits with forces that full runs corrected.
+        Number of fits to forces near full runs.
     peak : float
         Peak of the fitted force over the peak of the full run, minus 1.
     misfit : float
@@ -74,7 +77,7 @@ class FullRun(NamedTuple):
     def doubt(self) -> str:
         """Reason to reject or to doubt the values; empty if there is none."""
         if self.rejects:
-            return UNCONFIRMED.say(largest=f"{self.largest:.1%}", modes=self.modes)
+            return UNCONFIRMED.say(largest=f"{self.largest:.1%}")
         if self.is_settled:
             return ""
         return UNSETTLED.say(effect=f"{self.effect:.2g}", fits=self.fits)
@@ -110,7 +113,7 @@ def beside_full_run(model: ForceModel) -> ForceModel:
     if not outcome.fine[0]:
         return model
     plate = model.plate.following(impacts_from_cards({0: impact}), outcome)
-    return model._replace(plate=plate).corrected({}, outcome)
+    return model._replace(plate=plate)
 
 
 def confirmed(
@@ -122,45 +125,56 @@ def confirmed(
 
     `fit_again` fits the parameters of a corrected model, from the values of a fit.
     """
-    fits = 0
+    fits, effect, is_halved = 0, math.inf, False
     while True:
         outcome = model.outcome([fitted(model.deck, points.values)], judged=True)
         if model.plate.is_exact or not outcome.fine[0]:
             return Confirmed(model, points, outcome)
         full_run = _compared(model, points, outcome, fits)
-        if fits == MOST_FITS or (fits and full_run.is_settled):
+        if fits == MOST_FITS or (fits and full_run.is_settled and not is_halved):
             return Confirmed(model, points, outcome, full_run)
-        corrected = model.corrected(points.values, outcome)
-        if fits:
-            sizes = dict(zip(points.values, points.scaling.slopes(points.x).tolist(), strict=True))
-            corrections = corrected.corrections.meeting(model.corrections, sizes)
-            corrected = corrected._replace(corrections=corrections)
-        else:
-            corrected = _with_slopes(corrected, points)
+        corrected = model._replace(plate=model.plate.near(_expansion(model, points, outcome)))
         again = fit_again(corrected, points)
         if again is None:
             return Confirmed(model, points, outcome, full_run)
-        model, points, fits = corrected, again, fits + 1
+        # Steps to and fro have the values between them.
+        is_halved = full_run.effect > FALLS * effect and fits + 1 < MOST_FITS
+        if is_halved:
+            again = _halfway(corrected, points, again)
+        model, points, fits, effect = corrected, again, fits + 1, full_run.effect
 
 
-def _with_slopes(model: ForceModel, points: FittedPoints) -> ForceModel:
-    """Return the model with the derivatives of full runs beside the last one.
+def _halfway(model: ForceModel, before: FittedPoints, after: FittedPoints) -> FittedPoints:
+    """Return the values half-way between those of two fits, and their force."""
+    middle = replace(after, x=(before.x + after.x) / 2.0)
+    return replace(middle, model=model.at(middle.time, [middle.values])[:, 0])
 
-    A derivative is that of the reduced model where a run fails.
+
+def _expansion(model: ForceModel, points: FittedPoints, run: Outcome) -> Expansion:
+    """Return the expansion about a full run, by full runs beside it.
+
+    A derivative is left out, as 0, where a run fails.
     """
-    corrections, slopes = model.corrections, {}
+    times, _ = model.plate.forces(impacts_from_cards({0: fitted(model.deck, {})}), [points.values])
+    dt = float(run.columns[About.DT][0])
+    times = dt * np.arange(math.ceil(times[-1] / dt) + 1.0)
+    force, slopes = _force_at(times, run), {}
     for number, name in enumerate(points.scaling.start):
         if name in OF_RECORD:
             continue
         x = points.x.copy()
         x[number] += BESIDE if x[number] + BESIDE < points.scaling.high[number] else -BESIDE
         values = points.scaling.values(x)
-        run = model.outcome([fitted(model.deck, values)], judged=True)
-        if run.fine[0]:
-            _, difference = model.difference(values, run)
+        beside = model.outcome([fitted(model.deck, values)], judged=True)
+        if beside.fine[0]:
             change = values[name] - points.values[name]
-            slopes[name] = (difference - corrections.difference) / change
-    return model._replace(corrections=corrections._replace(slopes=slopes))
+            slopes[name] = (_force_at(times, beside) - force) / change
+    return Expansion(times, force, points.values, slopes)
+
+
+def _force_at(times: Floats, run: Outcome) -> Floats:
+    """Return the force of a run, which is 0 after its end."""
+    return np.asarray(np.interp(times, *force_after(run), right=0.0))
 
 
 def _deviation(points: FittedPoints) -> float:
@@ -170,7 +184,7 @@ def _deviation(points: FittedPoints) -> float:
 def _compared(model: ForceModel, points: FittedPoints, run: Outcome, fits: int) -> FullRun:
     """Compare the fitted force with the run of the fitted deck."""
     values = points.values | {OFFSET: 0.0}
-    alone = model._replace(corrections=NO_CORRECTIONS)
+    alone = model._replace(plate=model.plate.alone)
     force, force_alone = (trial.at(points.time, [values])[:, 0] for trial in (model, alone))
     in_full = model.of_run(points.time, values, run)
     peak, change = float(in_full.max()), in_full - force

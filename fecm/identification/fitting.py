@@ -18,13 +18,12 @@ from fecm.authoring.strike_values import Strike
 from fecm.authoring.values import check_names, strike_of_case
 from fecm.deck.model import Deck
 from fecm.identification.alignment import IdentifyError, contact_points
-from fecm.identification.corrections import NO_CORRECTIONS, Corrections
 from fecm.identification.plates import ExactPlate, force_after
 from fecm.mechanics.contact_law import Law
 from fecm.results.comparison import Measurement
 from fecm.studies.rod_test.filters import Filter
 from fecm.sweeps.impact_columns import impacts_from_cards
-from fecm.sweeps.outcome import About, Outcome
+from fecm.sweeps.outcome import Outcome
 
 DELAY = "delay"  # measured time at which the projectile touches the plate
 OFFSET = "offset"  # measured force without a contact
@@ -61,7 +60,6 @@ class ForceModel(NamedTuple):
     sensor: Filter | None
     law: Law | None = None  # user's contact law, which replaces the law of the deck
     computed: Callable[[int], object] = lambda forces: None  # called with the number of forces
-    corrections: Corrections = NO_CORRECTIONS  # added to the forces of the plate
 
     def outcome(self, trials: Sequence[Strike], *, judged: bool) -> Outcome:
         """Compute impacts on the plate of the deck, under the law of this model."""
@@ -73,18 +71,16 @@ class ForceModel(NamedTuple):
 
         The times start one duration of the run before the contact.
         """
-        outcome = self.outcome([fitted(self.deck, trial) for trial in trials], judged=False)
-        if outcome.force is None:  # a full run failed
-            raise IdentifyError(outcome.status[0])
-        failed = np.flatnonzero(~np.isfinite(outcome.force).all(axis=1))
+        strikes = [fitted(self.deck, trial) for trial in trials]
+        impacts = impacts_from_cards(dict(enumerate(strikes)), self.law)
+        times, after = self.plate.forces(impacts, trials)
+        failed = np.flatnonzero(~np.isfinite(after).all(axis=0))
         if self.law is not None and len(failed):  # a judged run gives the reason
             judged = self.outcome([fitted(self.deck, trials[failed[0]])], judged=True)
             raise IdentifyError(str(judged.status[0]))
         self.computed(len(trials))
-        steps = outcome.force.shape[1]
-        clock = float(outcome.columns[About.DT][0]) * np.arange(-steps, steps + 1.0)
-        forces = np.vstack([np.zeros((steps + 1, len(trials))), outcome.force.T])
-        forces += self.corrections.at(clock, trials)
+        clock = np.concatenate([-times[:0:-1], times])
+        forces = np.vstack([np.zeros((len(times) - 1, len(trials))), after])
         return clock, forces if self.sensor is None else self.sensor(clock, forces)
 
     def covering(self, duration: float) -> ForceModel:
@@ -94,19 +90,7 @@ class ForceModel(NamedTuple):
     def beside(self, deck: Deck) -> ForceModel:
         """Return the model with the exact forces of another deck."""
         plate = self.plate.like(deck)
-        return self._replace(deck=deck, plate=plate, corrections=NO_CORRECTIONS)
-
-    def corrected(self, values: Mapping[str, float], run: Outcome) -> ForceModel:
-        """Return the model with the force of a full run at its values."""
-        clock, difference = self.difference(values, run)
-        corrections = self.corrections._replace(clock=clock, difference=difference, place=values)
-        return self._replace(corrections=corrections)
-
-    def difference(self, values: Mapping[str, float], run: Outcome) -> tuple[Floats, Floats]:
-        """Return the difference of a full run from the force of the plate, after its times."""
-        plain = self._replace(sensor=None, corrections=NO_CORRECTIONS)
-        clock, force = plain.histories([values])
-        return clock, np.interp(clock, *force_after(run), right=0.0) - force[:, 0]
+        return self._replace(deck=deck, plate=plate)
 
     def of_run(self, time: Floats, values: Mapping[str, float], run: Outcome) -> Floats:
         """Return the measured force, (times,), that a run with these values predicts."""

@@ -94,9 +94,9 @@ class IdentificationJob:
     points, with the variance of the residual. Errors of the model come in addition;
     :attr:`Identification.plate_errors` has two of them.
 
-    The forces of a plate that stretches (NONL) come from the reduced model of sweeps. Full runs at
-    the fitted values correct them until the values settle; the last one confirms the fit
-    (:attr:`Identification.full_run`).
+    The first fit of a plate that stretches (NONL) takes the forces of the reduced model of sweeps.
+    Force and derivatives of full runs at the fitted values then take their place, until the values
+    settle. The last full run confirms them (:attr:`Identification.full_run`).
 
     Parameters
     ----------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import ClassVar, Self
@@ -12,6 +13,8 @@ from fecm._errors import StudyError
 from fecm._typing import Floats
 from fecm.authoring.time_values import duration_of
 from fecm.deck.model import Deck
+from fecm.identification.alignment import IdentifyError
+from fecm.identification.expansion import Expansion
 from fecm.problem.loading import sole_problem
 from fecm.problem.problem import Problem
 from fecm.results.sinks import MemorySink
@@ -23,6 +26,7 @@ from fecm.sweeps.outcome import About, Backend, Outcome
 from fecm.sweeps.reduced import MODES
 
 USUAL_RUNS = 5  # of the deck and of fitted decks, and those of the errors of the plate
+NO_DIFFERENCE = (np.zeros(1), np.zeros(1))
 EXACT = 0.01  # error of the factor of the flexibility
 
 
@@ -32,8 +36,12 @@ class ExactPlate:
 
     problem: Problem
     backend: Backend
-    modes: ClassVar[int] = 0  # bending modes of the trial forces
     is_exact: ClassVar[bool] = True
+
+    @property
+    def modes(self) -> int:
+        """Number of bending modes of the first trial forces; 0 if they are exact."""
+        return 0
 
     def outcomes(self, impacts: Impacts, *, judged: bool) -> Outcome:
         """Compute impacts."""
@@ -43,8 +51,31 @@ class ExactPlate:
         """Return the plate in runs of a duration, if that saves time."""
         return self
 
+    def forces(
+        self, impacts: Impacts, values: Sequence[Mapping[str, float]]
+    ) -> tuple[Floats, Floats]:
+        """Return times from 0 on, and the forces of impacts with these values, (times, impacts).
+
+        Raises IdentifyError if a full run fails.
+        """
+        outcome = self.outcomes(impacts, judged=False)
+        if outcome.force is None:
+            raise IdentifyError(outcome.status[0])
+        dt = float(outcome.columns[About.DT][0])
+        force = np.vstack([np.zeros(len(impacts)), outcome.force.T])
+        return dt * np.arange(float(len(force))), force
+
     def following(self, impact: Impacts, run: Outcome) -> Self:
-        """Return the plate with the force nearest to that of a full run."""
+        """Return the plate that has the force of the full run of an impact."""
+        return self
+
+    def near(self, expansion: Expansion) -> ExpandedPlate:
+        """Return the plate with forces of full runs near one."""
+        return ExpandedPlate(self.problem, self.backend, self, expansion)
+
+    @property
+    def alone(self) -> ExactPlate:
+        """The plate without the full runs that it follows."""
         return self
 
     def like(self, deck: Deck) -> ExactPlate:
@@ -63,8 +94,13 @@ class ModalPlate(ExactPlate):
     backend: BendingModes
     share: float = 1.0  # duration of the runs, over that of the program
     softness: float = 1.0  # flexibility of the omitted modes, over that at rest
-    modes: ClassVar[int] = MODES
+    difference: tuple[Floats, Floats] = NO_DIFFERENCE  # times, and force added to the trial forces
     is_exact: ClassVar[bool] = False
+
+    @property
+    def modes(self) -> int:
+        """Number of bending modes of the trial forces."""
+        return self.backend.modes
 
     def outcomes(self, impacts: Impacts, *, judged: bool) -> Outcome:
         """Compute impacts; if judged, in full."""
@@ -81,6 +117,18 @@ class ModalPlate(ExactPlate):
         softened = replace(plate, flexibility=self.softness * plate.flexibility)
         return replace(self.backend.lengthened(self.share), reduced=softened)
 
+    def forces(
+        self, impacts: Impacts, values: Sequence[Mapping[str, float]]
+    ) -> tuple[Floats, Floats]:
+        """Return times from 0 on, and the forces of impacts, (times, impacts)."""
+        times, forces = super().forces(impacts, values)
+        return times, forces + np.interp(times, *self.difference)[:, None]
+
+    @property
+    def alone(self) -> ModalPlate:
+        """The plate without the full runs that it follows."""
+        return replace(self, difference=NO_DIFFERENCE)
+
     def covering(self, duration: float) -> Self:
         """Return the plate in runs of a duration; a program with OVER has steps for longer ones."""
         if not self.problem.work.at_most:
@@ -88,23 +136,25 @@ class ModalPlate(ExactPlate):
         return replace(self, share=min(1.0, duration / duration_of(self.problem)))
 
     def following(self, impact: Impacts, run: Outcome) -> Self:
-        """Return the plate with the force nearest to that of a full run.
+        """Return the plate that has the force of the full run of an impact.
 
         The reduced model has the omitted modes as a linear spring. In a plate that stretches, the
-        membrane stiffens them.
+        membrane stiffens them: the softness that gives the nearest force is taken. The difference
+        that is left is added to all forces.
         """
         from scipy.optimize import minimize_scalar  # takes 0.2 s to import
 
-        clock, in_full = force_after(run)
+        def left(plate: ModalPlate) -> tuple[Floats, Floats]:
+            """Return the difference of the run from the plate."""
+            times, force = force_after(plate.outcomes(impact, judged=False))
+            return times, np.interp(times, *force_after(run), right=0.0) - force
 
         def misfit(softness: float) -> float:
-            times, force = force_after(
-                replace(self, softness=softness).outcomes(impact, judged=False)
-            )
-            return float(np.mean((force - np.interp(times, clock, in_full, right=0.0)) ** 2))
+            return float(np.mean(left(replace(self, softness=softness))[1] ** 2))
 
         best = minimize_scalar(misfit, bounds=(0.0, 1.0), options={"xatol": EXACT})
-        return replace(self, softness=float(best.x))
+        nearest = replace(self, softness=float(best.x))
+        return replace(nearest, difference=left(nearest))
 
     def like(self, deck: Deck) -> ExactPlate:
         """Return the plate of another deck, in full runs as long as here."""
@@ -117,6 +167,43 @@ class ModalPlate(ExactPlate):
             lambda observer: motion([self.problem], MemorySink(), (), observers=[observer])
         )
         return (USUAL_RUNS + parameters) * (before + step * self.problem.work.steps)
+
+
+@dataclass(frozen=True)
+class ExpandedPlate(ExactPlate):
+    """Plate with forces of full runs near one."""
+
+    plate: ExactPlate
+    expansion: Expansion
+    is_exact: ClassVar[bool] = False
+
+    @property
+    def modes(self) -> int:
+        """Number of bending modes of the first trial forces."""
+        return self.plate.modes
+
+    def outcomes(self, impacts: Impacts, *, judged: bool) -> Outcome:
+        """Compute impacts in full."""
+        return self.plate.outcomes(impacts, judged=True)
+
+    def forces(
+        self, impacts: Impacts, values: Sequence[Mapping[str, float]]
+    ) -> tuple[Floats, Floats]:
+        """Return times from 0 on, and the forces at values, (times, values)."""
+        return self.expansion.times, self.expansion.at(values)
+
+    def near(self, expansion: Expansion) -> ExpandedPlate:
+        """Return the plate with forces of full runs near another one."""
+        return replace(self, expansion=expansion)
+
+    @property
+    def alone(self) -> ExactPlate:
+        """The plate without the full runs that it follows."""
+        return self.plate.alone
+
+    def like(self, deck: Deck) -> ExactPlate:
+        """Return the plate of another deck, in full runs as long as here."""
+        return self.plate.like(deck)
 
 
 def force_after(run: Outcome) -> tuple[Floats, Floats]:
