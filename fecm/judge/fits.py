@@ -78,7 +78,8 @@ FAILED_RUN = ModelLimit("run of the fitted deck", note="the run of the fitted de
 UNCONFIRMED = ModelLimit(
     "difference from the full run",
     0.02,
-    note="the fitted force differs by up to {largest} of the peak from the full run of the fitted deck",
+    note="the fitted force differs by up to {largest} of the peak from the full run of the fitted "
+    "deck",
     remedy="start from better values in the deck, or fit fewer parameters",
     level=TrustLevel.OUTSIDE,
 )
