@@ -166,7 +166,8 @@ class ModalPlate(ExactPlate):
         before, step = seconds_of_steps(
             lambda observer: motion([self.problem], MemorySink(), (), observers=[observer])
         )
-        return (USUAL_RUNS + parameters) * (before + step * self.problem.work.steps)
+        steps = self.backend.durations[0] * self.problem.work.steps
+        return (USUAL_RUNS + parameters) * (before + step * steps)
 
 
 @dataclass(frozen=True)
