@@ -64,8 +64,8 @@ if TYPE_CHECKING:
     from fecm.results.hdf5_reader import FileContents
 
 
-# Time step times the angular frequency of the fastest bending mode, of the contact on the plate, and
-# of the projectile on the contact.
+# Time step times the angular frequency of the fastest bending mode, of the contact on the plate,
+# and of the projectile on the contact.
 MODE_PHASE = 0.7
 PLATE_PHASE = 0.5
 PROJECTILE_PHASE = 0.2
