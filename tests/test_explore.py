@@ -155,6 +155,8 @@ def test_a_page_in_modes_that_do_not_give_the_peak_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("fecm.exploration.plates.MODES", 1)
+    monkeypatch.setattr("fecm.mechanics.reduced_plate.VECTORS", 1)
+    monkeypatch.setattr("fecm.mechanics.reduced_plate._bent_plates", lambda *given: [])
     with pytest.raises(fecm.errors.ExploreError, match=r"differs from that of a full run by \+1\d"):
         _ = fecm.explore(STRETCHING).html
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import fsolve
 from scipy.special import ellipk
 
 from fecm import ContactPoint
@@ -16,14 +17,16 @@ from fecm.mechanics.membrane import MembraneForces
 from fecm.mechanics.mesh import equation_numbers
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.points import DISC, patch_weights
+from fecm.mechanics.quick_models import static_curve
 from fecm.mechanics.reduced_plate import (
     ReducedMotion,
     ReducedPlate,
     ReductionError,
     SeriesLaw,
-    _moved_eigenvectors,
-    bending_modes,
+    _bending_mass,
+    bending_vectors,
     reduced_plate,
+    ritz_vectors,
 )
 from fecm.mechanics.solutions import Tangent, modes, static_stiffness
 from fecm.mechanics.strains import FLAT, Curvature
@@ -88,23 +91,26 @@ def relaxed_energy(plate: PlateModel, field: Floats) -> float:
 @pytest.mark.parametrize("lam", [isotropic_plate(THICKNESS), general_plate()])
 @pytest.mark.few(3)  # of 8, 0.08 s each
 def test_the_energy_is_that_of_the_elements_with_the_membrane_in_equilibrium(
-    lam: LaminateSection, curvature: Curvature, held: bool
+    lam: LaminateSection, curvature: Curvature, held: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(reduction, "SPRING", -1.0)  # all vectors are coordinates
     plate = replace(on_square(lam, held=held, distorted=True), curvature=curvature)
     plate = plate if lam.is_coupled else replace(plate, preload=(1e-5, -2e-6, 3e-6))
-    contact = patch_on(plate, 0.6, 0.45)
-    shapes = bending_modes(plate, contact, 5).shapes
-    reduced = reduced_plate(plate, contact, 5, error=0.0)
-    q = np.array([0.7, -0.4, 0.3, 0.2, -0.1])
-    field = plate.field(shapes @ q, 0.0)
-    largest = np.abs(field[:, 2]).max()
-    q, field = q * lam.thickness / largest, field * lam.thickness / largest
-    first, second = np.triu_indices(5)
-    membrane = -(reduced.cubic[5:] @ (q[first] * q[second])) / reduced.stiffness[5:]
-    energy = reduced.strain_energy(np.append(q, membrane)[:, None])
-    assert reduced.bending == 5
-    assert energy[0] == pytest.approx(relaxed_energy(plate, field), rel=1e-11)
-    linear = 0.5 * float((reduced.stiffness[:5] * q * q).sum())
+    reduced = reduced_plate(plate, patch_on(plate, 0.6, 0.45), 5, error=0.0, has_fields=True)
+    assert reduced.fields is not None
+    bending, count = reduced.bending, reduced.shapes
+    static = reduced.deflection[:bending] / reduced.stiffness[:bending]
+    z = reduced.part @ (static * (1.0 + 0.5 * np.cos(np.arange(bending) + 1.0)))
+    bent = reduced.part.T @ z / reduced.stiffness[:bending]
+    largest = np.abs(reduced.fields.moving[:bending, :, 2].T @ bent).max()
+    z, bent = z * lam.thickness / largest, bent * lam.thickness / largest
+    first, second = np.triu_indices(count)
+    membrane = -(reduced.cubic[count:] @ (z[first] * z[second])) / reduced.stiffness[bending:]
+    q = np.append(bent, membrane)
+    field = reduced.fields.fields(reduced.fields.amplitudes(q[None], np.zeros(1)))[0]
+    energy = reduced.strain_energy(q[:, None])
+    assert energy[0] == pytest.approx(relaxed_energy(plate, field), rel=1e-8)
+    linear = 0.5 * float((reduced.stiffness[:bending] * bent * bent).sum())
     assert energy[0] > 1.04 * linear  # the plate does stretch
 
 
@@ -122,26 +128,22 @@ def test_internal_forces_are_the_gradient_of_the_energy() -> None:
     assert np.abs(slope - exact).max() < 1e-7 * np.abs(exact).max()
 
 
-def test_modes_are_those_of_the_plate_that_the_load_moves_most() -> None:
+def test_ritz_vectors_that_the_load_moves_most_are_modes_of_the_plate() -> None:
     plate = on_square(isotropic_plate(THICKNESS), held=True, n=3)
     oblong = plate.mesh.coordinates * (1.0, 0.73)  # no two modes of equal frequency
     plate = replace(plate, mesh=replace(plate.mesh, coordinates=oblong))
     contact = patch_on(plate, 0.4, 0.38)
-    actual = bending_modes(plate, contact, 6)
+    load = contact[plate.mesh.equations > 0]
+    static, *krylov = bending_vectors(plate, contact, 60)
+    vectors = ritz_vectors(plate.stiffness, _bending_mass(plate), load, krylov)
     every = modes(plate, plate.neq, consistent=False)
-    moved = every.shapes @ contact[plate.mesh.equations > 0]
-    shares = (moved / every.angular_frequency) ** 2
-    largest = np.argsort(-shares)[:6]
-    assert actual.stiffness == pytest.approx(every.angular_frequency[largest] ** 2, rel=1e-9)
-    assert actual.deflection == pytest.approx(np.abs(moved[largest]), rel=1e-6)
-    assert 1.0 / actual.compliance == pytest.approx(static_stiffness(plate, contact), rel=1e-10)
-
-
-def test_a_central_load_finds_no_mode_that_it_does_not_move() -> None:
-    plate = on_square(isotropic_plate(THICKNESS), held=True, n=8)
-    actual = bending_modes(plate, patch_on(plate), 14)
-    assert (actual.shares > 1e-8 * actual.compliance).all()
-    assert (np.diff(np.sort(actual.stiffness)) > 1e-6 * actual.stiffness.max()).all()
+    shares = (every.shapes @ load / every.angular_frequency) ** 2
+    largest, found = np.argsort(-shares)[:6], np.argsort(-vectors.shares)[:6]
+    assert vectors.stiffness[found] == pytest.approx(
+        every.angular_frequency[largest] ** 2, rel=1e-9
+    )
+    assert vectors.shares[found] == pytest.approx(shares[largest], rel=1e-6)
+    assert 1.0 / (load @ static) == pytest.approx(static_stiffness(plate, contact), rel=1e-10)
 
 
 @pytest.mark.parametrize("held", [True, False])
@@ -163,42 +165,49 @@ def test_half_of_a_plate_that_a_half_turn_maps_onto_itself_gives_the_modes_of_th
     monkeypatch.setattr(reduction, "symmetry_reduction", whole_plate)
     whole = reduced_plate(plate, contact, 4, error=0.0)
     assert seen
-    assert half.bending == whole.bending == 4
-    # Membrane modes have either sign.
-    assert half.stiffness == pytest.approx(whole.stiffness, rel=1e-9)
-    assert half.deflection == pytest.approx(whole.deflection, rel=1e-7)
-    assert half.flexibility == pytest.approx(whole.flexibility, rel=1e-7)
-    actual, wanted = (plate.factor.T @ plate.factor for plate in (half, whole))
-    np.testing.assert_allclose(actual, wanted, rtol=0.0, atol=1e-7 * np.abs(wanted).max())
-    atol = 1e-7 * np.abs(whole.cubic).max()
-    np.testing.assert_allclose(np.abs(half.cubic), np.abs(whole.cubic), rtol=0.0, atol=atol)
+    assert half.shapes == whole.shapes >= 4
+    # Vectors beyond the modes depend on rounding.
+    assert half.stiffness[0] == pytest.approx(whole.stiffness[0], rel=1e-9)
+    bent = [plate.deflection[:, None] / plate.stiffness[:, None] for plate in (half, whole)]
+    actual, wanted = (
+        plate.strain_energy(q * THICKNESS / (plate.deflection @ q))
+        for plate, q in zip((half, whole), bent, strict=True)
+    )
+    assert actual == pytest.approx(wanted, rel=2e-4)
 
 
-def test_modes_of_equal_frequency_are_the_one_that_moves() -> None:
-    diagonal = np.array([3.0, 2.0, 2.0, 2.0 - 1e-11, 1.0])
-    beside = np.array([0.0, 1e-11, 1e-12, 0.0])
-    inverse = np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1)
-    load = np.array([1.0, -2.0, 0.5, 3.0, 1.5])
-    values, vectors = _moved_eigenvectors(diagonal, beside, load)
-    assert values == pytest.approx([3.0, 2.0, 1.0])
-    assert inverse @ vectors == pytest.approx(vectors * values, abs=1e-9)
-    # Together they move as far as all modes, and none of equal frequency is left to move.
-    assert ((vectors.T @ load) ** 2).sum() == pytest.approx(float(load @ load), rel=1e-12)
-
-
-def test_all_modes_leave_no_compliance_to_the_contact() -> None:
-    plate = on_square(isotropic_plate(THICKNESS), held=True, n=2)
-    reduced = reduced_plate(plate, patch_on(plate), 100)
-    assert reduced.bending < 100
-    assert reduced.flexibility < 1e-8 / static_stiffness(plate, patch_on(plate))
-
-
-def test_few_modes_and_the_spring_have_the_static_stiffness_of_the_plate() -> None:
+def test_few_modes_and_the_spring_have_the_static_stiffness_of_the_plate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(reduction, "SPRING", 0.03)
     plate = on_square(isotropic_plate(THICKNESS), held=True)
     reduced = reduced_plate(plate, patch_on(plate), 3)
     compliance = (reduced.deflection**2 / reduced.stiffness).sum() + reduced.flexibility
-    assert reduced.flexibility > 0.005 * compliance
+    assert 0.001 * compliance < reduced.flexibility < 0.03 * compliance
     assert 1.0 / compliance == pytest.approx(static_stiffness(plate, patch_on(plate)), rel=1e-10)
+
+
+@pytest.mark.parametrize("curvature", [FLAT, (0.05, -0.1, 0.02)])
+def test_the_static_curve_is_that_of_the_elements_up_to_two_thicknesses(
+    curvature: Curvature,
+) -> None:
+    plate = replace(on_square(isotropic_plate(THICKNESS), held=True), curvature=curvature)
+    contact, h = patch_on(plate, 0.6, 0.45), THICKNESS
+    curve = static_curve(plate, contact, 0.25 * h, lambda w, force, work: w > 2.0 * h)
+    reduced = reduced_plate(plate, contact, 6)
+
+    def balance(values: Floats, w: float) -> Floats:
+        q, force = values[:-1] / scale, values[-1]
+        forces = reduced.internal_forces(q[:, None])[:, 0] - force * reduced.deflection
+        moved = float(reduced.deflection @ q) + reduced.flexibility * force
+        return np.append(forces / scale, (moved - w) / w)
+
+    scale = np.sqrt(reduced.stiffness)
+    start = np.zeros(len(scale) + 1)
+    for w in (0.5 * h, h, 1.5 * h, 2.0 * h):
+        start = fsolve(balance, start, args=(w,), xtol=1e-10)
+        assert start[-1] == pytest.approx(float(curve.at(w)[0]), rel=5e-3)
+    assert start[-1] > 1.5 * 2.0 * h * static_stiffness(plate, contact)
 
 
 def test_a_plate_that_is_not_held_has_no_reduced_model() -> None:
@@ -215,7 +224,7 @@ def test_a_plate_that_is_not_held_has_no_reduced_model() -> None:
 def one_mode(quartic: float = 0.0, damping: float = 0.0) -> ReducedPlate:
     """An oscillator of frequency 1 with the energy q^2/2 + quartic q^4/2."""
     return ReducedPlate(
-        bending=1,
+        part=np.ones((1, 1)),
         stiffness=np.array([1.0]),
         deflection=np.array([1.0]),
         flexibility=0.0,

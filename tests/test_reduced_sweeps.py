@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,14 @@ import fecm
 from fecm import RigidMass
 from fecm.authoring.case import CasesError
 from fecm.authoring.strike_values import strike_of
+from fecm.mechanics import reduced_plate
 from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
 from fecm.mechanics.reduced_plate import ReducedPlate
 from fecm.problem.loading import load_deck
 from fecm.results.metrics import RATIO
 from fecm.sweeps import execute
 from fecm.sweeps.impact_columns import impacts_from_cards
+from fecm.sweeps.methods import _plate
 from fecm.sweeps.plan import plan
 from fecm.sweeps.reduced import ReducedImpacts, ReducedModel, by_halvings, count_held, reduced
 from fecm.sweeps.responses import Hits
@@ -38,19 +41,40 @@ PROGRAM = LONGER.replace("600", str(STEPS))
 WHOLE = LONGER.replace("600", "480")  # beyond the contact
 DECK = text(PROGRAM, data=BLOW)
 SPEEDS = [300.0, 600.0, 900.0]
+SOFT = 0.018  # share of the spring of a plate that is too soft
 ENOUGH = 4  # modes of this plate, which has few nodes
 ROD = BLOW.replace("PROJ\n0, 0, 2e-5\n\n", "PROJ\n4, 0, .5, 1e7, 2e-4\n1, 1, .5\n4, 0, .5\n\n")
 GAGED = text(PROGRAM, data=BLOW + "GAGE\n1, .5, .5, .01, 0.\n\n")
+
+
+@contextmanager
+def reduced_with(**constants: object) -> Iterator[None]:
+    """Reduce plates with other constants of the model, and forget them."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in constants.items():
+            patch.setattr(reduced_plate, name, value)
+        _plate.cache_clear()
+        yield
+    _plate.cache_clear()
+
+
+@pytest.fixture
+def every_vector() -> Iterator[None]:
+    """Take all vectors as coordinates, none as a spring."""
+    with reduced_with(SPRING=-1.0):
+        yield
 
 
 @pytest.fixture(scope="module")
 def swept() -> fecm.SweepResult:
     """ComputedImpacts by the reduced model."""
     given = {"velocity": SPEEDS}
-    return fecm.sweep(DECK, given, model="reduced", modes=ENOUGH, measure="max_deflection")
+    with reduced_with(SPRING=-1.0):
+        return fecm.sweep(DECK, given, model="reduced", modes=ENOUGH, measure="max_deflection")
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("every_vector")
 def test_in_all_modes_the_cases_are_those_of_full_runs() -> None:
     # All modes that the load moves take thrice the steps of a few.
     given = {"velocity": [300.0, 1000.0]}
@@ -82,6 +106,7 @@ def test_impacts_up_to_twice_the_thickness_are_those_of_a_spectral_program(case:
         deck,
         {"velocity": wanted["velocity_mm_per_s"].tolist()},
         model="reduced",
+        modes=21,
         measure="max_deflection",
     )
     np.testing.assert_allclose(sweep_result["peak_force"], wanted["peak_N"], rtol=1e-2)
@@ -121,6 +146,14 @@ def test_three_full_runs_are_stored_beside_the_cases_and_shown(
         assert file["reduced"].attrs["modes"] == ENOUGH
 
 
+@pytest.fixture
+def coarse() -> Iterator[None]:
+    """Reduce plates to as many vectors as modes, without static deflections."""
+    with reduced_with(VECTORS=1, _bent_plates=lambda *given: []):
+        yield
+
+
+@pytest.mark.usefixtures("coarse")
 def test_too_few_modes_are_refused_before_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
     ran: list[Task] = []
     _outcomes = execute._outcomes
@@ -137,8 +170,17 @@ def test_too_few_modes_are_refused_before_the_sweep(monkeypatch: pytest.MonkeyPa
 
 
 def test_cases_of_energies_at_which_the_model_does_not_hold_are_run_in_full(
-    tmp_path: Path,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    right = reduced_plate.reduced_plate
+
+    def soft(*given: Any, **options: Any) -> ReducedPlate:
+        """Reduce a plate that is too soft, which matters where the contact is stiff."""
+        plate = right(*given, **options)
+        shares = plate.deflection**2 / plate.stiffness
+        return replace(plate, flexibility=SOFT * float(shares.sum()))
+
+    monkeypatch.setattr("fecm.sweeps.reduced.reduced_plate", soft)
     (tmp_path / "d.inp").write_text(DECK)
     given = ("sweep", "d.inp", "--vary", "velocity=50,100,200,300,400,600,900", "--history")
     assert call(*given, "-o", "full.h5", cwd=tmp_path).exit_code == 0
@@ -184,6 +226,7 @@ def test_a_model_with_all_its_modes_is_not_told_to_take_more() -> None:
         ReducedModel(40, {**row, **full}).check()
 
 
+@pytest.mark.usefixtures("every_vector")
 def test_a_case_does_not_depend_on_the_others(swept: fecm.SweepResult) -> None:
     others = {"velocity": [900.0, 450.0], "k": [5e4]}
     again = fecm.sweep(DECK, others, model="reduced", modes=ENOUGH, measure="max_deflection")
@@ -225,12 +268,13 @@ def test_kernels_give_what_numpy_gives_and_a_case_the_same_bytes_with_any_others
     deck = text(PROGRAM, data=ROD + "CURV\n.02, .01, 0.\n\n" if coupled else BLOW)
     (problem,) = load_deck(deck).problems
     model = reduced(problem, ENOUGH)
+    spring = 0.01 * float((model.plate.deflection**2 / model.plate.stiffness).sum())
+    model = replace(model, plate=replace(model.plate, flexibility=spring))
     if coupled:
         model = replace(model, plate=replace(model.plate, damping=1000.0)).halved(3)
     model = replace(model, steps=2000 if coupled else 500)
     model = replace(model, times=model.dt * np.array([0.4, 1.0, 77.3, 77.9, model.steps]))
-    assert model.plate.flexibility > 0.0
-    assert model.plate.coupled == (0 if coupled else model.plate.bending)
+    assert model.plate.coupled == (0 if coupled else model.plate.shapes)
     rng = np.random.default_rng(3)
     count = 11
     scale, speed = rng.uniform(0.5, 2.0, count), rng.uniform(0.0, 900.0, count)
@@ -285,7 +329,7 @@ def test_the_compliance_left_out_is_in_series_with_the_contact() -> None:
     # A plate that does not move but by the spring: the energy of the projectile is that of both.
     k, c, mass, speeds = 1e5, 2e-5, 1e-3, np.array([500.0, 2000.0])
     none = np.zeros((1, 1))
-    plate = ReducedPlate(1, np.array([1e16]), np.array([1e-3]), c, cubic=none, factor=none)
+    plate = ReducedPlate(np.array([1e16]), np.array([1e-3]), c, np.ones((1, 1)), none, none)
     law = LinearPermanent(*(np.full(2, x) for x in (k, 1e9, 0.0, 1.5)))
     hits = Hits([RigidMass(mass)], np.zeros(2, np.intp), np.ones(2), HystereticLaw(law), speeds)
     actual = ReducedImpacts(plate, 5e-7, 2000).impacts(hits)
@@ -336,6 +380,7 @@ def test_what_the_model_does_not_give_is_refused(
         fecm.sweep(deck, **(options | given))
 
 
+@pytest.mark.usefixtures("coarse")
 def test_a_refused_sweep_leaves_nothing_behind(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(DECK)
     given = ("sweep", "d.inp", "--vary", "velocity=900", "--model", "reduced", "--modes")

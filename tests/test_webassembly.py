@@ -67,8 +67,8 @@ def test_webassembly_gives_the_forces_of_the_library(
     assert calls > 0
     assert actual.force is not None
     assert wanted.force is not None
-    peaks = wanted.force.max(axis=1, keepdims=True)
+    peaks = np.nanmax(wanted.force, axis=1)  # NaN after the end of a case
     assert (peaks > 1.0).all()
-    assert np.abs(actual.force - wanted.force).max() <= 1e-13 * peaks.max()
+    np.testing.assert_allclose(actual.force, wanted.force, rtol=0.0, atol=1e-13 * peaks.max())
     for name in ("peak_force", "impulse", "max_indentation", "permanent_indentation"):
         np.testing.assert_allclose(actual[name], wanted[name], rtol=1e-11)

@@ -91,7 +91,7 @@ class SweepStruct(Structure):
 
 
 class ReducedStruct(Structure):
-    """A nonlinear plate in n coordinates, the first of which are modes of bending.
+    """A nonlinear plate in n coordinates, of bending and of the membrane.
 
     Matrices are cut by :func:`tiles`.  The arrays:
 
@@ -101,10 +101,10 @@ class ReducedStruct(Structure):
     `keep`        (n,)                     increment of a coordinate per increment before
     `share`       (n,)                     increment per force
     `rate`        (n,)                     velocity per sum of the increments before and after
-    `factor`      (rank + n - coupled,     B over the rows of C from `coupled` on
-                  pairs)
-    `transposed`  (pairs,                  its transpose
-                  rank + n - coupled)
+    `part`        (shapes, bending)        amplitudes of the coordinates
+    `spread`      (bending, shapes)        its transpose
+    `factor`      (rows, pairs)            B over the rows of C from `coupled` on
+    `transposed`  (pairs, rows)            its transpose
     `step`        (rows,)                  first step that ends at or after each stored time
     `back`        (rows,)                  time from there to the end of the step, over the step
     `stored`      (cases, rows, n)         coordinates; the kernel writes them
@@ -113,9 +113,10 @@ class ReducedStruct(Structure):
 
     _fields_ = (
         ("bending", c_int64),
-        ("coordinates", c_int64),
+        ("membrane", c_int64),
+        ("shapes", c_int64),
         ("rank", c_int64),
-        ("coupled", c_int64),  # first coordinate with a row of C
+        ("coupled", c_int64),  # first row of C that is not 0
         ("flexibility", c_double),  # displacement of a spring at the contact per force
         ("damping", c_double),  # a dt of the damping matrix a M
         ("stiffness", Doubles),
@@ -123,6 +124,8 @@ class ReducedStruct(Structure):
         ("keep", Doubles),
         ("share", Doubles),
         ("rate", Doubles),
+        ("part", Doubles),
+        ("spread", Doubles),
         ("factor", Doubles),
         ("transposed", Doubles),
         ("rows", c_int64),  # stored times

@@ -113,7 +113,7 @@ def static_curve(
     """
     points: list[_Point] = []
     works = [0.0]
-    for point in islice(_equilibria(plate, contact, step), MOST_STEPS + 1):
+    for point, _ in islice(equilibria(plate, contact, step), MOST_STEPS + 1):
         points.append(point)
         if len(points) == 1:
             continue
@@ -137,8 +137,14 @@ class _Point(NamedTuple):
     stiffness: float
 
 
-def _equilibria(plate: PlateModel, contact: Floats, step: float) -> Iterator[_Point]:
-    """Yield equilibria without end, starting at rest."""
+def equilibria(
+    plate: PlateModel, contact: Floats, step: float, growth: float = LARGEST_STEP
+) -> Iterator[tuple[_Point, Floats]]:
+    """Yield points of the static curve and their displacement fields without end, starting at rest.
+
+    The other arguments are those of :func:`static_curve`.  Steps of the deflection are `step` and
+    then `growth` times the deflection, unless the equilibrium is not found.
+    """
     path = (_LiftingPath if plate.lifts else _Path)(plate, contact)
     load = path.load
     u, turn = np.zeros((2, len(load)))
@@ -147,8 +153,8 @@ def _equilibria(plate: PlateModel, contact: Floats, step: float) -> Iterator[_Po
     compliance = float(load @ compliant)
     direction = compliant / compliance  # du/dW
     while True:
-        yield _Point(deflection, force, 1.0 / compliance)
-        step_size = max(step_size, LARGEST_STEP * deflection)
+        yield _Point(deflection, force, 1.0 / compliance), path.field(u)
+        step_size = max(step_size, growth * deflection)
         while (
             result := path.equilibrium(u + step_size * (direction + step_size / 2.0 * turn))
         ) is None:
@@ -187,6 +193,10 @@ class _Path:
         self._stiffness = reduction.reduced(plate.stiffness, plate.mesh.equations > 0)
         self._membrane = MembraneForces(plate, reduction.weights.astype(float))
         self._factorise(np.zeros(reduction.count))
+
+    def field(self, u: Floats) -> Floats:
+        """Return the displacement field, (numnp, 5), of a displacement."""
+        return self._reduction.field(u)
 
     def _factorise(self, u: Floats) -> None:
         self._place = u  # displacement of the tangent

@@ -1,35 +1,43 @@
-"""A nonlinear plate in a few modes, and its motion under the contact forces of many impacts.
+"""A nonlinear plate in a few coordinates, and its motion under the contact forces of many impacts.
 
-All impacts are at one place.  The deflection is a sum of bending modes q_i phi_i of the plate at
-rest.  The displacements u and v in the plane follow from s_ij = q_i q_j (A. A. Muravyov and S. A.
-Rizzi, Computers & Structures 81, 2003, 1513).  Here they are computed with the element matrices
-instead of a fit:
+All impacts are at one place.  The deflection is a sum of Ritz vectors q_i phi_i of bending, which
+diagonalise stiffness and mass of the plate at rest.  Their space has the Lanczos vectors of the
+load, which start with the static displacement (B. Nour-Omid and R. W. Clough, Earthquake
+Engineering & Structural Dynamics 12, 1984, 565), and some static deflections of the stretching
+plate.  The first vectors are modes.  The others take the energy that the modes left out would carry
+away from the load, and let the plate under the load stretch as it does statically.  The fastest
+vectors, which have hardly any compliance, follow the contact force F statically.  They add F/k_r to
+the displacement under the load:
 
-    u, v = U q + sum over i <= j of u_ij s_ij,    K_mm U = -K_mb phi,    K_mm u_ij = -r_ij,
+    W = sum g_i q_i + F/k_r,    1/k_r = 1/k_b - sum g_i^2/omega_i^2,
+
+with the displacement g_i of a vector under the load and the static stiffness k_b of the linear
+plate there.  Each vector adds g_i^2/omega_i^2 to the static compliance.
+
+The membrane sees the projection of the deflection on few shapes of unit stiffness, z = P q: the
+vectors of the largest shares in the static compliance, and the static deflections.  The projection
+is orthogonal in the stiffness, so that a static deflection in the space of the shapes is exact.
+The displacements u and v follow from s_ij = z_i z_j (A. A. Muravyov and S. A. Rizzi,
+Computers & Structures 81, 2003, 1513).  Here they are computed with the element matrices instead of
+a fit:
+
+    u, v = U z + sum over i <= j of u_ij s_ij,    K_mm U = -K_mb phi,    K_mm u_ij = -r_ij,
     r_ij = int B_m' A eps_q(i, j),
 
 where eps_q(i, j) is the part of the quadratic strains (:mod:`~fecm.mechanics.membrane`) that
 belongs to s_ij.  The strain energy is
 
-    1/2 sum omega_i^2 q_i^2 + q' C s + 1/2 s' Q s,    Q = int eps_ij A eps_kl,
+    1/2 sum omega_i^2 q_i^2 + z' C s + 1/2 s' Q s,    Q = int eps_ij A eps_kl,
     C_i,kl = int N_i eps_q(k, l),    eps_ij = eps_q(i, j) + B_m u_ij,
 
-with the membrane force N_i = A (B_m U_i + w_i/R) + B kappa_i of a bending mode; U and C are zero
-unless the laminate or a curvature couples bending and stretching.
+with the membrane force N_i = A (B_m U_i + w_i/R) + B kappa_i of a shape; U and C are zero unless
+the laminate or a curvature couples bending and stretching.
 
 A static membrane has no inertia.  This matters where the edges are free in the plane: the lowest
-membrane modes psi_k are then hardly faster than the bending modes.  The membrane modes that the
-quadratic strains of the static deflection excite most are therefore coordinates as well.  A
-coordinate q_k of such a mode adds the row psi_k' r to C, and the term
-(psi_k' r)' (psi_k' r)/Omega_k^2 to Q, which cancels the static displacement of the mode.
-
-The modes left out follow the contact force F statically.  They add F/k_r to the displacement under
-the load:
-
-    W = sum g_i q_i + F/k_r,    1/k_r = 1/k_b - sum g_i^2/omega_i^2,
-
-with the displacement g_i of a mode under the load and the static stiffness k_b of the linear plate
-there.  Each mode adds g_i^2/omega_i^2 to the static compliance.  The modes that add most are kept.
+membrane modes are then hardly faster than those of bending.  Ritz vectors psi_k of the membrane,
+under the pull of a static deflection, are therefore coordinates as well.  A coordinate q_k of such
+a vector adds the row psi_k' r to C, and the term (psi_k' r)' (psi_k' r)/Omega_k^2 to Q, which
+cancels the static displacement of the vector.
 
 Q is positive, and few of its eigenvectors matter for the stiffness of the plate under the load.
 With the rows of B, as few as keep this stiffness, Q = B' B and the last energy is 1/2 |B s|^2.
@@ -47,10 +55,11 @@ central difference of a vibration is sin(omega dt)/(omega dt) times the velocity
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -64,7 +73,13 @@ from fecm.mechanics.interpolation import NDOF, interpolate
 from fecm.mechanics.membrane import BLOCK, TYING, QuadraticStrains
 from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.solutions import SingularStiffnessError, Tangent, rigid_in_plane
+from fecm.mechanics.quick_models import equilibria
+from fecm.mechanics.solutions import (
+    ConvergenceError,
+    SingularStiffnessError,
+    Tangent,
+    rigid_in_plane,
+)
 from fecm.mechanics.symmetry import (
     SymmetryReduction,
     symmetry_reduction,
@@ -72,86 +87,97 @@ from fecm.mechanics.symmetry import (
     with_codes,
 )
 
-# Residual of a converged mode relative to its eigenvalue; the error of the frequency is its square.
-CONVERGED = 1e-6
-# Largest size of the Krylov space: vectors per requested mode, plus a constant.
-VECTORS_PER_MODE, MORE_VECTORS = 12, 60
-# Steps between two solutions of the eigenvalue problem in the Krylov space.
-LOOK = 20
-# Squares of frequencies are equal if their relative difference is smaller.
-EQUAL = 1e-8
+if TYPE_CHECKING:
+    from scipy import sparse
+
+# Lanczos vectors per vector that the membrane sees.
+VECTORS = 4
 # The Krylov space is complete if a new vector is smaller relative to the last vector.
 EXHAUSTED = 1e-12
-# The load does not move a mode whose share in the static compliance is smaller.
+# A load, or a shape, does not move a vector whose share in the static compliance is smaller.
 UNMOVED = 1e-10
-# Largest number of membrane modes, their least share in the static compliance, and their largest
-# frequency relative to the bending modes; a higher frequency would cost time steps.
-MEMBRANE_MODES, MEMBRANE_SHARE, MEMBRANE_FASTEST = 6, 0.01, 1.5
+# Vectors are independent, and a shape is new, if the energy beside the others is larger, over the
+# own one.
+INDEPENDENT, NEW = 1e-9, 1e-7
+# Share of the static compliance that is left to the spring; faster coordinates cost time steps.
+SPRING = 1e-4
+# Lanczos vectors of the membrane, and the least share in the static compliance of a coordinate.
+MEMBRANE_VECTORS, MEMBRANE_SHARE = 12, 1e-3
+# Static deflections, over the thickness, whose shapes the plate has: the first, and the next ones
+# over the one before, up to the largest.
+FIRST_BENT, NEXT_BENT, BENT = 1.0, 1.2, 2.0
+MOST_STATIC = 3  # shapes of static deflections beside the modes, unless equilibria are hard to find
 # Error of B' B in the displacement that the stretching takes from a static one under the load,
-# relative to the largest.  It is the largest error of deflections whose modes scatter about the
+# relative to the largest.  It is the largest error of deflections whose shapes scatter about the
 # static ones, by a share of each, and that reach from a part of the largest.
-STRETCHING = 1e-6
+STRETCHING = 1e-4
 SCATTER, SMALLEST, DEFLECTIONS = 0.5, 0.2, 200
 # Least size of displacements in the plane that a field has, over the largest.
 IN_PLANE = 1e-3
-# Static deflection, over the thickness, at which the omitted modes follow the membrane's forces
-# exactly; least energy of the states of membrane stress there, over the largest, and least size of
-# their forces.
-BENT, STATES, OMITTED = 2.0, 1e-5, 1e-2
-# States for which memory is reserved; plates have some 30.
-MOST_STATES = 40
 
 
 class ReductionError(FecmError, ArithmeticError):
     """The plate has no reduced model."""
 
 
-class ReducedModes(NamedTuple):
-    """Modes that a load moves, by descending share in the static compliance."""
+class RitzVectors(NamedTuple):
+    """Vectors that diagonalise mass and stiffness, as modes do, with unit modal mass."""
 
-    stiffness: Floats  # (m,): squares of the angular frequencies
-    shapes: Floats  # (neq, m): unit modal mass
-    deflection: Floats  # (m,): displacement under the load; positive
-    compliance: float  # static displacement under a unit load
-    static: Floats  # (neq,): static displacements under a unit load
-    load: Floats  # the unit load
+    stiffness: Floats  # (n,): squares of the angular frequencies
+    shapes: Floats  # (neq, n)
+    deflection: Floats  # (n,): displacement under a unit load; positive
 
     @property
     def shares(self) -> Floats:
-        """Static displacement of each mode under a unit load, (m,)."""
+        """Static displacement of each vector under the unit load, (n,)."""
         return np.asarray(self.deflection**2 / self.stiffness)
+
+    def select(self, rows: Indices) -> RitzVectors:
+        """Return some of the vectors."""
+        return RitzVectors(self.stiffness[rows], self.shapes[:, rows], self.deflection[rows])
 
 
 @dataclass(frozen=True)
 class ReducedPlate:
-    """A plate in n coordinates: m bending modes, followed by membrane modes.
+    """A plate in n coordinates: those of bending, followed by membrane modes.
 
-    Arrays over pairs have an entry for each of the m (m + 1)/2 pairs i <= j of bending modes.
+    The membrane sees the amplitudes z = P q of some shapes, m of them.  Arrays over pairs have an
+    entry for each of the m (m + 1)/2 pairs i <= j of shapes.
     """
 
-    bending: int  # m
     stiffness: Floats  # (n,): squares of the angular frequencies
     deflection: Floats  # (n,): displacement under the load; 0 for membrane modes
-    flexibility: float  # 1/k_r: displacement of the modes left out per force
-    cubic: Floats  # C, (n, pairs)
+    flexibility: float  # 1/k_r: displacement that no coordinate has, per force
+    part: Floats  # P, (m, coordinates of bending)
+    cubic: Floats  # C, (m + membrane modes, pairs)
     factor: Floats  # B, (rank, pairs): Q = B' B
     damping: float = 0.0  # a of the damping matrix a M
     fields: ReducedFields | None = None  # where displacement fields are asked for
 
     @property
+    def bending(self) -> int:
+        """Number of coordinates of bending."""
+        return int(self.part.shape[1])
+
+    @property
+    def shapes(self) -> int:
+        """Number of shapes that the membrane sees."""
+        return len(self.part)
+
+    @property
     def fastest(self) -> float:
-        """Largest angular frequency of the bending modes."""
+        """Largest angular frequency of bending."""
         return float(np.sqrt(self.stiffness[: self.bending].max()))
 
     @cached_property
     def _pairs(self) -> tuple[Indices, Indices]:
-        """Bending modes i and j of the pairs."""
-        first, second = np.triu_indices(self.bending)
+        """Shapes i and j of the pairs."""
+        first, second = np.triu_indices(self.shapes)
         return first, second
 
     @cached_property
     def coupled(self) -> int:
-        """First coordinate with a row of C that is not 0, or the number of coordinates."""
+        """First row of C that is not 0, or the number of rows."""
         rows = np.flatnonzero(self.cubic.any(axis=1))
         return int(rows[0]) if len(rows) else len(self.cubic)
 
@@ -162,98 +188,78 @@ class ReducedPlate:
 
     @cached_property
     def _tables(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """B over C and its transpose, and the sums over the pairs of each mode i and j."""
-        modes = np.arange(self.bending)[:, None]
-        of_first, of_second = ((index == modes).astype(float) for index in self._pairs)
+        """B over C and its transpose, and the sums over the pairs of each shape i and j."""
+        shapes = np.arange(self.shapes)[:, None]
+        of_first, of_second = ((index == shapes).astype(float) for index in self._pairs)
         return self.stacked, self.stacked.T.copy(), of_first, of_second
+
+    def _seen(self, q: Floats) -> Floats:
+        """Return the amplitudes of the shapes, and of the membrane modes."""
+        return np.concatenate([self.part @ q[: self.bending], q[self.bending :]])
 
     def strain_energy(self, q: Floats) -> Floats:
         """Return the strain energy, (cases,), of coordinates (n, cases)."""
         first, second = self._pairs
-        s = q[first] * q[second]
-        of_coordinates = q * (0.5 * self.stiffness[:, None] * q + self.cubic @ s)
-        of_pairs = 0.5 * (self.factor @ s) ** 2
-        return np.asarray(of_coordinates.sum(axis=0) + of_pairs.sum(axis=0))
+        z = self._seen(q)
+        s = z[first] * z[second]
+        linear = 0.5 * (self.stiffness[:, None] * q * q).sum(axis=0)
+        coupled = (z * (self.cubic @ s)).sum(axis=0)
+        return np.asarray(linear + coupled + 0.5 * ((self.factor @ s) ** 2).sum(axis=0))
 
     def internal_forces(self, q: Floats) -> Floats:
         """Return the derivatives of the strain energy with respect to coordinates (n, cases)."""
         stacked, transposed, of_first, of_second = self._tables
-        rank, coupled = len(self.factor), self.coupled
-        first, second = (q[index] for index in self._pairs)
+        rank, coupled, m = len(self.factor), self.coupled, self.shapes
+        z = self._seen(q)
+        first, second = (z[index] for index in self._pairs)
         of_rows = stacked @ (first * second)
-        forces = self.stiffness[:, None] * q
-        forces[coupled:] += of_rows[rank:]
-        of_rows[rank:] = q[coupled:]
+        seen = np.zeros_like(z)
+        seen[coupled:] = of_rows[rank:]
+        of_rows[rank:] = z[coupled:]
         n = transposed @ of_rows
         second *= n
         first *= n
-        forces[: self.bending] += of_first @ second + of_second @ first
+        seen[:m] += of_first @ second + of_second @ first
+        forces = self.stiffness[:, None] * q
+        forces += np.concatenate([self.part.T @ seen[:m], seen[m:]])
         return forces
 
 
 @dataclass(frozen=True)
 class ReducedFields:
-    """Displacement fields of a reduced plate, from its coordinates and the contact force.
+    """Displacement fields of a reduced plate, from its coordinates and the contact force."""
 
-    The omitted modes follow the contact force and the forces of the membrane on the bending modes,
-    both statically and with the stiffness that the membrane gives them.  Their displacement is a
-    sum of few fields with unit stiffness.  The displacements in the plane follow from the pairs of
-    the bending modes and of the static displacement of the omitted ones.
-    """
-
-    bending: int  # m
-    shapes: Floats  # (n, numnp, 5): of the coordinates
-    omitted: Floats  # (few, numnp, 5): of the omitted modes
+    part: Floats  # P, see :class:`ReducedPlate`
+    moving: Floats  # (n + 1, numnp, 5): of the coordinates, and of the spring under a unit force
     in_plane: Floats  # (rank, numnp, 2)
-    factor: Floats  # (rank, pairs): of the bending modes and the static displacement
-    membrane: Floats  # (states, pairs): states of membrane stress
-    push: Floats  # (few,): forces on the omitted modes per contact force
-    project: Floats  # (few,): static displacement of the omitted modes in their displacement
-    cubic: Floats  # (few, states * m): of a state and a bending mode
-    square: Floats  # (few, pairs): of a coupled laminate or a curved plate; zero otherwise
-    stiffness: Floats  # (states, few, few)
+    factor: Floats  # (rank, pairs)
 
     @property
     def count(self) -> int:
         """Number of amplitudes."""
-        return len(self.shapes) + len(self.omitted) + len(self.in_plane)
+        return len(self.moving) + len(self.in_plane)
 
     def amplitudes(self, q: Floats, force: Floats) -> Floats:
         """Return the amplitudes, (rows, count), of coordinates (rows, n) and forces (rows,).
 
-        They are those of :attr:`shapes`, :attr:`omitted` and :attr:`in_plane`.
+        They are those of :attr:`moving` and :attr:`in_plane`.
         """
-        bent, few = q[:, : self.bending], len(self.omitted)
-        pairs = self._pairs(bent, force)
-        states = small_products(pairs, self.membrane.T)
-        triples = (states[:, :, None] * bent[:, None]).reshape(len(q), -1)
-        pull = force[:, None] * self.push + small_products(pairs, self.square.T)
-        pull += small_products(triples, self.cubic.T)
-        stiffness = small_products(states, self.stiffness.reshape(len(self.membrane), -1))
-        stiffness = np.eye(few) + stiffness.reshape(-1, few, few)
-        omitted = np.linalg.solve(stiffness, pull[:, :, None])[:, :, 0]
-        static = np.einsum("rf,f", omitted, self.project)
-        followed = small_products(self._pairs(bent, static), self.factor.T)
-        return np.column_stack([q, omitted, followed])
-
-    def _pairs(self, bent: Floats, static: Floats) -> Floats:
-        """Return the products of bending modes (rows, m) and of the static displacement (rows,)."""
-        moved = np.column_stack([bent, static])
-        first, second = np.triu_indices(self.bending + 1)
-        return np.asarray(moved[:, first] * moved[:, second])
+        z = small_products(q[:, : self.part.shape[1]], self.part.T)
+        first, second = np.triu_indices(len(self.part))
+        pairs = np.asarray(z[:, first] * z[:, second])
+        return np.column_stack([q, force, small_products(pairs, self.factor.T)])
 
     @cached_property
     def _tables(self) -> tuple[Floats, Floats]:
-        """Shapes of w and the rotations, and of u and v, in rows."""
-        shapes = np.concatenate([self.shapes, self.omitted])
-        bent = shapes[:, :, 2:].reshape(len(shapes), -1)
-        in_plane = np.concatenate([shapes[:, :, :2], self.in_plane])
+        """Moving shapes of w and the rotations, and shapes of u and v, in rows."""
+        bent = self.moving[:, :, 2:].reshape(len(self.moving), -1)
+        in_plane = np.concatenate([self.moving[:, :, :2], self.in_plane])
         return bent, in_plane.reshape(len(in_plane), -1)
 
     def fields(self, amplitudes: Floats) -> Floats:
         """Return displacement fields, (rows, numnp, 5)."""
         bent, in_plane = self._tables
-        rows, numnp = len(amplitudes), self.shapes.shape[1]
+        rows, numnp = len(amplitudes), self.moving.shape[1]
         fields = np.empty((rows, numnp, NDOF))
         w = small_products(amplitudes[:, : len(bent)], bent)
         fields[:, :, 2:] = w.reshape(rows, numnp, 3)
@@ -288,234 +294,106 @@ def reduced_plate(
     *,
     has_fields: bool = False,
 ) -> ReducedPlate:
-    """Reduce a plate to the `count` bending modes, at most, that a load (numnp, 5) moves most.
+    """Reduce a plate under a load (numnp, 5), whose membrane sees `count` Ritz vectors at most.
+
+    It also sees some static deflections.
 
     `error` is the error of B, see :data:`STRETCHING`.  With `has_fields` the plate also has its
-    displacement fields.  Raises ReductionError if the plate is not held, or if its modes do not
-    converge.
+    displacement fields.  Raises ReductionError if the plate is not held.
     """
-    turn = _at_rest(plate, contact)
-    bending, held = _bending_modes(plate, turn, contact, count)
+    free = plate.mesh.equations > 0
+    load = contact[free]
+    krylov = bending_vectors(plate, contact, VECTORS * count)
+    linear = krylov[0]
+    compliance = float(load @ linear)
     plane = _free_in_plane(plate)
-    # Modes that a half turn maps onto themselves have quadratic strains that it maps likewise.
-    in_plane = symmetry_reduction(plane, None) if turn.is_half else unreduced(plane)
-    bent, modes = bending.shapes, len(bending.stiffness)
-    if has_fields:
-        omitted = bending.static - bent @ (bending.deflection / bending.stiffness)
-        bent = np.column_stack([bent, omitted])
-    whole = _integrated(plate, in_plane, bent)
-    pairs = whole.of_first(modes)
+    # Shapes that a half turn maps onto themselves have quadratic strains that it maps likewise.
+    is_half = _at_rest(plate, contact).is_half
+    in_plane = symmetry_reduction(plane, None) if is_half else unreduced(plane)
+    tangent = Tangent(plane, reduction=in_plane) if plane.neq else None
+    bent = [linear, *_bent_plates(plate, contact, tangent, in_plane)]
+    vectors = ritz_vectors(plate.stiffness, _bending_mass(plate), load, [*krylov[1:], *bent])
+    modes = vectors.select(np.argsort(-vectors.shares, kind="stable")[:count])
+    modes = modes.select(np.flatnonzero(modes.shares > UNMOVED * compliance))
+    seen = modes.shapes / np.sqrt(modes.stiffness)
+    seen = np.hstack([seen, _beside(plate, seen, bent)])
+    part = (plate.stiffness @ seen).T @ vectors.shapes
+    # Rounding adds vectors that neither the load nor the membrane moves.
+    squares = np.vstack([vectors.shares / compliance, part**2 / vectors.stiffness])
+    vectors = vectors.select(np.flatnonzero(squares.max(axis=0) > UNMOVED))
+    coordinates = _slowest(vectors, compliance)
+    stiffest = coordinates.stiffness.max()
+    part = (plate.stiffness @ seen).T @ coordinates.shapes
+    # Largest amplitude of each shape in the static deflections.
+    force = BENT * plate.thicknesses.max() / compliance
+    static = np.array([force * linear, *bent[1:]]) @ (plate.stiffness @ seen)
+    size = np.abs(static).max(axis=0)
+
+    pairs = _integrated(plate, in_plane, seen)
     cubic, quartic = pairs.cubic, pairs.quartic
-    stiffness, deflection = [bending.stiffness], [bending.deflection]
-    static = bending.deflection / bending.stiffness
-    shape_fields = np.array([plate.field(shape, 0.0) for shape in bent.T])
-    dynamic_fields: list[Floats] = []
-    solved = np.zeros_like(whole.loads)
-    followed = solved
-    if plane.neq:
-        tangent = Tangent(plane, reduction=in_plane)
-        solved = tangent.solve(whole.loads)
-        quartic -= pairs.loads.T @ of_first(modes, solved)
-        followed = -solved
-        first, second = np.triu_indices(modes)
-        membrane = _moved_modes(
-            tangent,
-            _independent_mass(plane, in_plane, plane.mass),
-            pairs.loads @ (static[first] * static[second]),
-            MEMBRANE_MODES,
-            least=MEMBRANE_SHARE,
-            stiffest=MEMBRANE_FASTEST**2 * bending.stiffness.max(),
-            rigid=rigid_in_plane(plane, in_plane),
-        )
-        rows = membrane.shapes.T @ pairs.loads
-        quartic += (rows.T / membrane.stiffness) @ rows
+    membrane, followed = np.empty(0), np.zeros_like(pairs.loads)
+    across = np.empty((0, *contact.shape))
+    if tangent is not None:
+        followed = -tangent.solve(pairs.loads)
+        quartic += pairs.loads.T @ followed
+        first, second = np.triu_indices(seen.shape[1])
+        pull = pairs.loads @ (static[-1][first] * static[-1][second])
+        moved = _membrane_vectors(plane, in_plane, tangent, pull)
+        moved = moved.select(np.flatnonzero(moved.stiffness <= stiffest))
+        rows = moved.shapes.T @ pairs.loads
+        quartic += (rows.T / moved.stiffness) @ rows
         cubic = np.concatenate([cubic, rows])
-        stiffness.append(membrane.stiffness)
-        deflection.append(np.zeros(len(rows)))
-        dynamic = membrane.shapes.T @ whole.loads
-        followed = followed + (membrane.shapes / membrane.stiffness) @ dynamic
-        dynamic_fields = [in_plane.field(shape)[None] for shape in membrane.shapes.T]
+        followed += (moved.shapes / moved.stiffness) @ rows
+        membrane = moved.stiffness
+        across = np.array([in_plane.field(shape) for shape in moved.shapes.T]).reshape(
+            -1, *contact.shape
+        )
     fields = None
     if has_fields:
-        factor, vectors = _few(followed, np.append(static, 1.0))
-        across = np.array([in_plane.field(vector) for vector in vectors.T])
-        followers = _omitted(plate, (turn, held), bending, shape_fields, whole, (in_plane, solved))
+        factor, few = _few(followed, size)
+        spring = linear - coordinates.shapes @ (coordinates.deflection / coordinates.stiffness)
+        moving = [plate.field(shape, 0.0) for shape in [*coordinates.shapes.T, spring]]
+        displacements = np.array([in_plane.field(vector) for vector in few.T])
         fields = ReducedFields(
-            bending=modes,
-            shapes=np.concatenate([shape_fields[:modes], *dynamic_fields]),
+            part=part,
+            moving=np.concatenate([moving[:-1], across, moving[-1:]]),
+            in_plane=displacements.reshape(-1, *contact.shape)[..., :2].copy(),
             factor=factor,
-            in_plane=across.reshape(-1, *shape_fields.shape[1:])[..., :2].copy(),
-            **followers,
         )
     return ReducedPlate(
-        bending=modes,
-        stiffness=np.concatenate(stiffness),
-        deflection=np.concatenate(deflection),
-        flexibility=max(bending.compliance - float(bending.shares.sum()), 0.0),
+        stiffness=np.append(coordinates.stiffness, membrane),
+        deflection=np.append(coordinates.deflection, np.zeros(len(membrane))),
+        flexibility=max(compliance - float(coordinates.shares.sum()), 0.0),
+        part=part,
         cubic=cubic,
-        factor=factor_of((quartic + quartic.T) / 2.0, static, error),
+        factor=factor_of((quartic + quartic.T) / 2.0, size, error),
         damping=damping,
         fields=fields,
     )
 
 
-def _omitted(
-    plate: PlateModel,
-    held: tuple[SymmetryReduction, Tangent],
-    bending: ReducedModes,
-    shapes: Floats,
-    pairs: Pairs,
-    followed: tuple[SymmetryReduction, Floats],
-) -> dict[str, Floats]:
-    """Return how the omitted modes follow the contact and the membrane; see :class:`ReducedFields`.
+def _bent_plates(
+    plate: PlateModel, contact: Floats, tangent: Tangent | None, in_plane: SymmetryReduction
+) -> list[Floats]:
+    """Return static deflections of the stretching plate, (neq,), up to :data:`BENT`.
 
-    `shapes` (numnp, 5) are those of the modes and of the omitted modes under a unit force; `held`
-    are the independent dofs and their stiffness, `followed` those of the membrane with K_mm^-1 r
-    of the pairs.
+    u and v are those of the linear plate.  There are fewer if an equilibrium is not found.
     """
-    turn, tangent = held
-    m, numnp = len(bending.stiffness), len(plate.mesh.coordinates)
-    require_memory(bytes_of_fields(plate, m), "the reduced model of the plate")
-    # Force that bends the linear plate by some thicknesses, and the amplitudes under it.
-    force = BENT * plate.thicknesses.max() / bending.compliance
-    static = force * np.append(bending.deflection / bending.stiffness, 1.0)
-    first, second = np.triu_indices(m + 1)
-    size = np.abs(static[first] * static[second])
-    quartic = pairs.quartic - pairs.loads.T @ followed[1]
-    values, vectors = np.linalg.eigh((quartic + quartic.T) / 2.0 * np.outer(size, size))
-    kept = np.flatnonzero(values > STATES * values[-1])[::-1]
-    membrane, states = vectors[:, kept].T / size, size[:, None] * vectors[:, kept]
-    forces = MembraneStates(plate, shapes, followed, states)
-    # Loads of the size that they have in this deflection, of which few are independent.
-    amount = np.abs(membrane @ (static[first] * static[second]))
-    amount = np.maximum(amount, STATES**0.5 * amount.max(initial=0.0))
-    scales = np.append(np.outer(amount, np.abs(static[:m])), size[: forces.of_pairs.shape[1]])
-    triples = len(membrane) * m
-    on_w = forces.on(shapes[:m]) * scales[:triples]
-    of_pairs = forces.of_pairs * scales[triples:]
-    mixed = on_w.T @ of_pairs[2::NDOF]
-    gram = np.block([[on_w.T @ on_w, mixed], [mixed.T, of_pairs.T @ of_pairs]])
-    squares, vectors = np.linalg.eigh(gram)
-    basis = vectors[:, squares > OMITTED**2 * squares[-1:]][:, ::-1]
-    few = of_pairs @ basis[triples:]
-    few[2::NDOF] += on_w @ basis[:triples]
-    across = shapes[:m].reshape(m, -1)
-    independent = np.stack([turn.gather(load.reshape(numnp, NDOF)) for load in few.T], axis=1)
-    solved = [turn.field(part).ravel() for part in tangent.solve(independent).T]
-    moved = (few.T @ across.T / bending.stiffness) @ across - np.reshape(
-        solved, (-1, across.shape[1])
-    )
-    # The first field is that of the contact force.  `work` is the product with the stiffness.
-    fields = np.concatenate([force * shapes[m].reshape(1, -1), moved])
-    contact = force * bending.load.reshape(1, -1)
-    work = np.concatenate([contact, -few.T]) @ fields.T
-    energy, vectors = np.linalg.eigh((work + work.T) / 2.0)
-    kept = np.flatnonzero(energy > OMITTED**2 * energy[-1])[::-1]
-    root = np.sqrt(energy[kept])
-    fields = (vectors[:, kept] / root).T @ fields
-    amplitudes = root[:, None] * vectors[:, kept].T
-    of_loads = amplitudes[:, 1:] @ basis.T / scales
-    square = np.zeros((len(kept), len(size)))
-    square[:, : of_pairs.shape[1]] = of_loads[:, triples:]
-    fields = fields.reshape(-1, numnp, NDOF)
-    on_fields = forces.on(fields).reshape(numnp, len(membrane), len(fields))
-    stiffness = np.tensordot(fields[:, :, 2], on_fields, 1)
-    return {
-        "membrane": membrane,
-        "omitted": fields,
-        "push": amplitudes[:, 0] / force,
-        "project": amplitudes[:, 0] * force / work[0, 0] if work[0, 0] > 0.0 else 0.0 * root,
-        "cubic": np.ascontiguousarray(of_loads[:, :triples]),
-        "square": square,
-        "stiffness": np.ascontiguousarray(stiffness.transpose(1, 0, 2)),
-    }
-
-
-class MembraneStates:
-    """States of membrane stress, and their forces on the deflection of a plate.
-
-    `shapes` (modes, numnp, 5), `followed` and the pairs are those of :func:`_omitted`; `states`
-    (pairs, states) are the pairs of each state.
-    """
-
-    def __init__(
-        self,
-        plate: PlateModel,
-        shapes: Floats,
-        followed: tuple[SymmetryReduction, Floats],
-        states: Floats,
-    ) -> None:
-        in_plane, solved = followed
-        self._count, self._numnp = states.shape[1], shapes.shape[1]
-        displacement = -np.stack([in_plane.field(part)[:, :2] for part in solved.T], axis=2)
-        fields = shapes.transpose(1, 2, 0)
-        first, second = np.triu_indices(len(shapes))
-        # Forces of the pairs in a coupled laminate or a curved plate, (5 numnp, pairs or 0).
-        couples = plate.is_curved or plate.is_coupled
-        self.of_pairs = np.zeros((NDOF * self._numnp, len(first) * couples))
-        self._blocks: list[tuple[ElementBlock, QuadraticStrains, Floats]] = []
-        for family in plate.families:
-            laminate = plate.laminate_of(family)
-            for block in family.blocks(BLOCK):
-                tied = QuadraticStrains(block, plate.rules.bending)
-                basis = interpolate(block, plate.rules.bending)
-                linear = membrane_and_bending(basis, plate.curvature)  # (ne, points, 6, 5 nodes)
-                ne, nodes = block.nodes.shape
-                weight = basis.jxw[:, :, None, None]
-                strains = _pair_strains(plate, block, fields[block.nodes, 2])
-                of_plane = linear.reshape(ne, -1, 6, nodes, NDOF)[:, :, :3, :, :2]
-                nodal = displacement[block.nodes].reshape(ne, 1, 2 * nodes, -1)
-                strains += of_plane.reshape(ne, -1, 3, 2 * nodes) @ nodal
-                stresses = weight * (laminate.A @ (strains @ states))
-                self._blocks.append((block, tied, stresses.transpose(3, 2, 1, 0).copy()))
-                if not (laminate.is_coupled or plate.is_curved):
-                    continue
-                AB = np.hstack([laminate.A, laminate.B])
-                forces = linear.transpose(0, 3, 1, 2).reshape(ne, nodes * NDOF, -1)
-                resultants = (weight * (AB.T @ strains)).reshape(ne, -1, len(first))
-                places = (NDOF * block.nodes[:, :, None] + np.arange(NDOF)).reshape(ne, -1)
-                np.add.at(self.of_pairs, places, forces @ resultants)
-                values = fields[block.nodes].reshape(ne, 1, nodes * NDOF, -1)
-                stresses = (weight * (AB @ (linear @ values))).transpose(3, 2, 1, 0)
-                slopes = _slopes(tied, block, shapes)
-                tied_forces = [tied.tied_forces(N) for N in stresses]
-                for pair, (i, j) in enumerate(zip(first.tolist(), second.tolist(), strict=True)):
-                    on_w = _on_w(tied, tied_forces[i], slopes[j])
-                    if i != j:
-                        on_w = on_w + _on_w(tied, tied_forces[j], slopes[i])
-                    np.add.at(self.of_pairs[:, pair], NDOF * block.nodes.T + 2, on_w)
-        # In the plane the membrane is in equilibrium.
-        self.of_pairs.reshape(self._numnp, NDOF, -1)[:, :2] = 0.0
-
-    def on(self, shapes: Floats) -> Floats:
-        """Return the forces on w of each state on each shape (shapes, numnp, 5), (numnp, ...)."""
-        forces = np.zeros((self._numnp, self._count, len(shapes)))
-        for block, tied, stresses in self._blocks:
-            slopes = _slopes(tied, block, shapes)
-            nodes = block.nodes.T
-            for state, N in enumerate(stresses):
-                n = tied.tied_forces(N)
-                for number, of_shape in enumerate(slopes):
-                    np.add.at(forces[:, state, number], nodes, _on_w(tied, n, of_shape))
-        return forces.reshape(self._numnp, -1)
-
-
-def _slopes(
-    tied: QuadraticStrains, block: ElementBlock, shapes: Floats
-) -> list[tuple[Floats, Floats]]:
-    """Return the slopes of w of each shape (shapes, numnp, 5) at the tying points."""
-    return [tied.slopes(w) for w in shapes[:, block.nodes, 2].swapaxes(1, 2)]
-
-
-def _on_w(
-    tied: QuadraticStrains, n: tuple[Floats, Floats, Floats], slopes: tuple[Floats, Floats]
-) -> Floats:
-    """Return the forces on w, (nodes, ne), of the tied forces of a membrane force on slopes."""
-    n11, n22, n12 = n
-    w_1, w_2 = slopes
-    along_one = np.concatenate([w_1[:TYING] * n11, w_2[TYING:] * n12])
-    along_two = np.concatenate([w_2[:TYING] * n22, w_1[TYING:] * n12])
-    return tied.nodal_forces(along_one, along_two)
+    h, free = plate.thicknesses.max(), plate.mesh.equations > 0
+    shapes: list[Floats] = []
+    with suppress(ConvergenceError, SingularStiffnessError):
+        for point, field in equilibria(plate, contact, FIRST_BENT * h, NEXT_BENT):
+            if point.deflection == 0.0:
+                continue
+            field[:, :2] = 0.0
+            if tangent is not None:
+                forces = np.zeros_like(field)
+                forces[free] = plate.stiffness @ field[free]
+                field = field - in_plane.field(tangent.approximate(in_plane.gather(forces)))
+            shapes.append(field[free])
+            if point.deflection >= BENT * h:
+                break
+    return shapes
 
 
 def _few(displacements: Floats, static: Floats) -> tuple[Floats, Floats]:
@@ -554,16 +432,64 @@ def factor_of(quartic: Floats, static: Floats, error: float) -> Floats:
     return np.ascontiguousarray(rows[: matter[-1] + 1 if len(matter) else 0])
 
 
-# Modes --------------------------------------------------------------------------------------------
+# Ritz vectors -------------------------------------------------------------------------------------
 
 
-def bending_modes(plate: PlateModel, contact: Floats, count: int) -> ReducedModes:
-    """Compute the modes with the largest shares in the displacement under a load, (numnp, 5).
+def ritz_vectors(
+    stiffness: sparse.csr_array, mass: Floats, load: Floats, basis: Sequence[Floats] | Floats
+) -> RitzVectors:
+    """Return the Ritz vectors of a stiffness and masses (neq,) in the span of vectors (n, neq)."""
+    vectors = np.transpose(basis)
+    vectors = vectors / np.sqrt(np.einsum("ij,ij->j", vectors, stiffness @ vectors))
+    vectors = vectors @ _unit(vectors.T @ (stiffness @ vectors), INDEPENDENT)
+    values, turned = np.linalg.eigh((mass[:, None] * vectors).T @ vectors)
+    shapes = vectors @ (turned / np.sqrt(values))
+    deflection = np.einsum("ij,i", shapes, load)
+    shapes = shapes * np.where(deflection < 0.0, -1.0, 1.0)
+    return RitzVectors(1.0 / values, shapes, np.abs(deflection))
 
-    The masses are lumped.  The masses of u and v are left out, so that u and v follow statically.
-    Raises ReductionError if the plate is not held.
+
+def _slowest(vectors: RitzVectors, compliance: float) -> RitzVectors:
+    """Return the slowest vectors that have the compliance but for a share :data:`SPRING`."""
+    order = np.argsort(vectors.stiffness)
+    left = compliance - np.cumsum(vectors.shares[order])
+    return vectors.select(order[: np.count_nonzero(left > SPRING * compliance) + 1])
+
+
+def _unit(gram: Floats, least: float) -> Floats:
+    """Return the combinations of vectors with a Gram matrix that make unit vectors.
+
+    Combinations whose square is at most `least` are left out.
     """
-    return _bending_modes(plate, _at_rest(plate, contact), contact, count)[0]
+    values, vectors = np.linalg.eigh((gram + gram.T) / 2.0)
+    kept = values > least
+    return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
+
+
+def _beside(plate: PlateModel, basis: Floats, shapes: list[Floats]) -> Floats:
+    """Return vectors of unit stiffness for what shapes (neq,) add to such a basis (neq, n)."""
+    added = np.stack(shapes, axis=1)
+    added = added / np.sqrt(np.einsum("ij,ij->j", added, plate.stiffness @ added))
+    for _ in range(2):  # Gram-Schmidt, twice for orthogonality to rounding
+        added = added - basis @ (basis.T @ (plate.stiffness @ added))
+    return np.asarray(added @ _unit(added.T @ (plate.stiffness @ added), NEW))
+
+
+def bending_vectors(plate: PlateModel, contact: Floats, count: int) -> list[Floats]:
+    """Return up to `count` Lanczos vectors of bending, (neq,), and first the static displacement.
+
+    The load is (numnp, 5).  The masses are lumped.  The masses of u and v are left out, so that u
+    and v follow statically.  Raises ReductionError if the plate is not held.
+    """
+    reduction, free = _at_rest(plate, contact), plate.mesh.equations > 0
+    try:
+        tangent = Tangent(plate, reduction=reduction)
+        static = tangent.solve(reduction.gather(contact))
+    except SingularStiffnessError as error:
+        raise ReductionError(f"a reduced model needs a plate that is held: {error}") from None
+    mass = _independent_mass(plate, reduction, _bending_mass(plate))
+    vectors = [static, *_lanczos(tangent, mass, static, count)]
+    return [reduction.field(vector)[free] for vector in vectors]
 
 
 def _at_rest(plate: PlateModel, contact: Floats) -> SymmetryReduction:
@@ -571,29 +497,11 @@ def _at_rest(plate: PlateModel, contact: Floats) -> SymmetryReduction:
     return symmetry_reduction(replace(plate, nonlinear=False), contact)
 
 
-def _bending_modes(
-    plate: PlateModel, reduction: SymmetryReduction, contact: Floats, count: int
-) -> tuple[ReducedModes, Tangent]:
-    """Compute the modes of :func:`bending_modes` in the independent dofs.
-
-    Returns them with the stiffness of these dofs.
-    """
+def _bending_mass(plate: PlateModel) -> Floats:
+    """Return the masses without those of u and v, (neq,)."""
     mass = plate.field(plate.mass, 0.0)
     mass[:, :2] = 0.0
-    free = plate.mesh.equations > 0
-    try:
-        tangent = Tangent(plate, reduction=reduction)
-        found = _moved_modes(
-            tangent,
-            _independent_mass(plate, reduction, mass[free]),
-            reduction.gather(contact),
-            count,
-        )
-    except SingularStiffnessError as error:
-        raise ReductionError(f"a reduced model needs a plate that is held: {error}") from None
-    shapes = [reduction.field(shape)[free] for shape in found.shapes.T]
-    static = reduction.field(found.static)[free]
-    return found._replace(shapes=np.stack(shapes, axis=1), static=static, load=contact), tangent
+    return np.asarray(mass[plate.mesh.equations > 0])
 
 
 def _independent_mass(plate: PlateModel, reduction: SymmetryReduction, mass: Floats) -> Floats:
@@ -601,128 +509,51 @@ def _independent_mass(plate: PlateModel, reduction: SymmetryReduction, mass: Flo
     return reduction.gather(reduction.sign * plate.field(mass, 0.0))
 
 
-def _moved_modes(
-    tangent: Tangent,
-    mass: Floats,
-    load: Floats,
-    count: int,
-    *,
-    least: float = UNMOVED,
-    stiffest: float = np.inf,
-    rigid: Floats | None = None,
-) -> ReducedModes:
-    """Find up to `count` modes with the largest shares in the displacement under a load, (neq,).
+def _membrane_vectors(
+    plane: PlateModel, reduction: SymmetryReduction, tangent: Tangent, pull: Floats
+) -> RitzVectors:
+    """Return Ritz vectors of the membrane under a load, in its independent dofs."""
+    mass = _independent_mass(plane, reduction, plane.mass)
+    rigid = rigid_in_plane(plane, reduction)
+    vectors = _lanczos(tangent, mass, tangent.solve(pull), MEMBRANE_VECTORS, rigid)
+    stiffness = reduction.reduced(plane.stiffness, plane.mesh.equations > 0)
+    found = ritz_vectors(stiffness, mass, pull, vectors)
+    return found.select(np.flatnonzero(found.shares > MEMBRANE_SHARE * found.shares.sum()))
 
-    Vectors are those of the tangent's independent dofs.  Modes whose share is below `least`, or
-    whose squared angular frequency exceeds `stiffest`, are left out.  `rigid` (motions, neq) are
-    motions without strain, on which the load does no work.
 
-    Lanczos iteration with K^-1 M, starting from the static displacement, finds the modes in the
-    order of their shares.  Among modes of equal frequency it finds the mode that the load moves.
-    Products of a matrix and a vector are sums by einsum: BLAS would wake threads for each.
+def _lanczos(
+    tangent: Tangent, mass: Floats, static: Floats, count: int, rigid: Floats | None = None
+) -> Floats:
+    """Return up to `count` Lanczos vectors, (size, neq), from a static displacement (neq,).
+
+    Vectors are those of the tangent's independent dofs.  `rigid` (motions, neq) are motions without
+    strain, on which the load does no work.  The iteration is that with K^-1 M (B. Nour-Omid and
+    R. W. Clough, Earthquake Engineering & Structural Dynamics 12, 1984, 565).  Products of a matrix
+    and a vector are sums by einsum: BLAS would wake threads for each.
     """
-    static = tangent.solve(load)
-    compliance = float(load @ static)
     roots = np.sqrt(mass)
     fixed = np.empty((0, len(mass)))
     if rigid is not None:
         fixed = np.linalg.qr((rigid * roots).T)[0].T / roots
-    rigid_count = len(fixed)
-    largest_size = min(
-        VECTORS_PER_MODE * count + MORE_VECTORS, int(np.count_nonzero(mass)) - rigid_count
-    )
-    basis = np.concatenate([fixed, np.empty((largest_size, len(mass)))])
-    diagonal, beside = np.zeros((2, largest_size))  # K^-1 M in the basis is tridiagonal
-    vector, _ = _orthogonalised(static, fixed, mass)
-    before = np.empty(0)
-    for size in range(1, largest_size + 1):
-        last, krylov = rigid_count + size - 1, basis[rigid_count : rigid_count + size]
-        basis[last] = vector / _norm(vector, mass)
+    start = len(fixed)
+    end = min(start + count, int(np.count_nonzero(mass)))
+    basis = np.concatenate([fixed, np.empty((end - start, len(mass)))])
+    vector, last, before = _orthogonalised(static, fixed, mass), start, 0.0
+    while last < end and (norm := _norm(vector, mass)) > EXHAUSTED * before:
+        basis[last] = vector / norm
         vector = tangent.approximate(mass * basis[last])
-        norm_before = _norm(vector, mass)
-        vector, parts = _orthogonalised(vector, basis[: last + 1], mass)
-        diagonal[size - 1] = parts[-1]
-        norm_left = _norm(vector, mass)
-        beside[size - 1] = norm_left
-        is_exhausted = norm_left <= EXHAUSTED * norm_before
-        if not is_exhausted and size < largest_size and (size < count or size % LOOK):
-            continue
-        loads = np.einsum("ij,j", krylov, load)
-        values, vectors = _moved_eigenvectors(diagonal[:size], beside[: size - 1], loads)
-        deflections = np.einsum("ij,i", vectors, loads)
-        shares = deflections**2 * values
-        error = norm_left * np.abs(vectors[-1])
-        is_unconverged = (error > CONVERGED * values) & (shares > UNMOVED * compliance)
-        converged = int(is_unconverged.argmax()) if is_unconverged.any() else len(values)
-        shares[converged:] = 0.0
-        shares[values * stiffest < 1.0] = 0.0
-        order = np.argsort(-shares, kind="stable")[:count]
-        order = order[shares[order] > least * compliance]
-        # Modes beyond the converged ones can be ignored if all their shares together are smaller
-        # than the selected shares, if each is smaller (assuming that none moves more than a
-        # converged mode), or if they are too stiff.
-        is_full = len(order) == count
-        rest_is_small = compliance - shares.sum() <= (
-            shares[order[-1]] if is_full else least * compliance
-        )
-        others_are_smaller = (
-            is_full
-            and (deflections[:converged] ** 2).max() * values[converged - 1] <= shares[order[-1]]
-        )
-        others_are_stiffer = (
-            converged < len(values) and (values[converged] + error[converged]) * stiffest < 1.0
-        )
-        is_unchanged = len(before) == len(order) and np.allclose(
-            before, values[order], CONVERGED, 0.0
-        )
-        if (
-            is_exhausted
-            or rest_is_small
-            or (is_unchanged and (others_are_smaller or others_are_stiffer))
-        ):
-            signs = np.where(deflections[order] < 0.0, -1.0, 1.0)
-            shapes = (signs * vectors[:, order]).T @ krylov
-            return ReducedModes(
-                1.0 / values[order],
-                shapes.T,
-                np.abs(deflections[order]),
-                compliance,
-                static,
-                load,
-            )
-        before = values[order]
-    raise ReductionError(f"{count} modes did not converge; take fewer")
+        before = _norm(vector, mass)
+        last += 1
+        vector = _orthogonalised(vector, basis[:last], mass)
+    return basis[start:last]
 
 
-def _moved_eigenvectors(diagonal: Floats, beside: Floats, load: Floats) -> tuple[Floats, Floats]:
-    """Return eigenvalues and eigenvectors of K^-1 M in the basis, by ascending frequency.
-
-    The matrix is tridiagonal, `beside` are the numbers beside its diagonal.  `load` are the parts
-    of the load along the basis.  Among modes of equal frequency only the mode that the load moves
-    is kept; rounding adds the other modes to the Krylov space.
-    """
-    from scipy.linalg import eigh_tridiagonal  # 0.1 s, which most runs don't need
-
-    values, vectors = eigh_tridiagonal(diagonal, beside)
-    values, vectors = values[::-1], vectors[:, ::-1]
-    deflections = np.einsum("ij,i", vectors, load)
-    starts = np.flatnonzero(np.append(True, values[1:] < (1.0 - EQUAL) * values[:-1]))
-    combined = np.add.reduceat(deflections * vectors, starts, axis=1)
-    size = np.sqrt(np.add.reduceat(deflections**2, starts))
-    return values[starts], combined / np.where(size > 0.0, size, 1.0)
-
-
-def _orthogonalised(vector: Floats, basis: Floats, mass: Floats) -> tuple[Floats, Floats]:
-    """Remove the parts of a vector along an orthonormal basis (size, neq).
-
-    Returns the remaining vector and the removed parts, (size,).
-    """
-    total = np.zeros(len(basis))
+def _orthogonalised(vector: Floats, basis: Floats, mass: Floats) -> Floats:
+    """Remove the parts of a vector along an orthonormal basis (size, neq)."""
     for _ in range(2):  # Gram-Schmidt, twice for orthogonality to rounding
         parts = np.einsum("ij,j", basis, mass * vector)
         vector = vector - np.einsum("i,ij", parts, basis)
-        total += parts
-    return vector, total
+    return vector
 
 
 def _norm(vector: Floats, mass: Floats) -> float:
@@ -733,24 +564,11 @@ def _norm(vector: Floats, mass: Floats) -> float:
 
 
 class Pairs(NamedTuple):
-    """Integrals of the quadratic strains of the pairs of bending modes."""
+    """Integrals of the quadratic strains of the pairs of shapes."""
 
     cubic: Floats  # (m, pairs): int N_i eps_q
     quartic: Floats  # (pairs, pairs): int eps_q A eps_q, u and v held
     loads: Floats  # (independent dofs of the membrane, pairs): r
-
-    def of_first(self, modes: int) -> Pairs:
-        """Return the integrals of the first modes."""
-        cubic, loads = (of_first(modes, part) for part in (self.cubic[:modes], self.loads))
-        return Pairs(cubic, of_first(modes, of_first(modes, self.quartic).T).T, loads)
-
-
-def of_first(modes: int, values: Floats) -> Floats:
-    """Return the columns (..., pairs) of the pairs of the first modes."""
-    # With one more mode, its pair is the last of each first mode.
-    count = (math.isqrt(8 * values.shape[1] + 1) - 1) // 2
-    first, second = np.triu_indices(count)
-    return np.ascontiguousarray(values[:, (first < modes) & (second < modes)])
 
 
 def _free_in_plane(plate: PlateModel) -> PlateModel:
@@ -765,14 +583,6 @@ def bytes_of_pairs(plate: PlateModel, neq: int, modes: int) -> int:
     count = modes * (modes + 1) // 2
     elements = min(BLOCK, max(len(family.rows) for family in plate.families))
     return 8 * count * (3 * neq + 4 * elements * 3 * len(plate.rules.bending.xi))
-
-
-def bytes_of_fields(plate: PlateModel, modes: int) -> int:
-    """Estimate the memory of the fields: forces of the states of membrane stress, and of pairs."""
-    couples = plate.is_curved or plate.is_coupled
-    pairs = (modes + 1) * (modes + 2) // 2
-    numbers = 2 * MOST_STATES * modes + 2 * pairs + 2 * NDOF * pairs * couples
-    return 8 * len(plate.mesh.coordinates) * numbers
 
 
 def _integrated(plate: PlateModel, in_plane: SymmetryReduction, shapes: Floats) -> Pairs:
@@ -884,13 +694,16 @@ def motion_struct(
     step, back = StoredTimes.of(np.empty(0), dt, 0) if stored is None else stored
     return ReducedStruct(
         bending=plate.bending,
-        coordinates=len(plate.stiffness),
+        membrane=len(plate.stiffness) - plate.bending,
+        shapes=plate.shapes,
         rank=len(plate.factor),
         coupled=plate.coupled,
         flexibility=plate.flexibility,
         damping=plate.damping * dt,
         stiffness=plate.stiffness,
         deflection=plate.deflection,
+        part=tiles(plate.part),
+        spread=tiles(plate.part.T),
         factor=tiles(plate.stacked),
         transposed=tiles(plate.stacked.T),
         rows=len(step),

@@ -284,7 +284,7 @@ class Recovery:
         They are xx, yy, xy at the points of tape8, without the quadratic strains and u and v.
         """
         model = self.model
-        shapes = np.concatenate([self.fields.shapes, self.fields.omitted])
+        shapes = self.fields.moving
         curvatures = model.strains.evaluate(shapes)[:3].reshape(3, len(shapes), -1)
         half = self._half(model.strains.rule)
         strains = np.ascontiguousarray(half * curvatures * np.reshape([1.0, 1.0, 0.5], (3, 1, 1)))
@@ -321,7 +321,7 @@ class Recovery:
         """Slopes of w of the moving shapes, (2, shapes, points)."""
         stretching = self.model.stretching
         assert stretching is not None  # the plate stretches
-        shapes = np.concatenate([self.fields.shapes, self.fields.omitted])
+        shapes = self.fields.moving
         return np.stack([stretching.slopes(shape) for shape in shapes], axis=1).T.copy()
 
     def _largest_slope(self, rows: NeededTimes, amplitudes: Floats) -> float:

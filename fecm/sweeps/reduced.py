@@ -27,14 +27,13 @@ from fecm.mechanics.impact import ContactState, couple_step
 from fecm.mechanics.impact_sweep import sweep_reduced
 from fecm.mechanics.plate import ASSEMBLED, PlateModel
 from fecm.mechanics.reduced_plate import (
-    MORE_VECTORS,
-    VECTORS_PER_MODE,
+    MOST_STATIC,
+    VECTORS,
     ReducedMotion,
     ReducedPlate,
     ReductionError,
     SeriesLaw,
     StoredTimes,
-    bytes_of_fields,
     bytes_of_pairs,
     motion_struct,
     reduced_plate,
@@ -64,15 +63,15 @@ if TYPE_CHECKING:
     from fecm.results.hdf5_reader import FileContents
 
 
-# Time step times the angular frequency of the fastest bending mode, of the contact on the plate,
+# Time step times the angular frequency of the fastest bending vector, of the contact on the plate,
 # and of the projectile on the contact.
-MODE_PHASE = 0.7
-PLATE_PHASE = 0.5
+MODE_PHASE = 1.0
+PLATE_PHASE = 1.0
 PROJECTILE_PHASE = 0.2
 # A contact that is still stiffer is left to the balance of energy.
 MOST_HALVINGS = 10
 REDUCED = "reduced"  # name of the model
-MODES = 21  # bending modes of the model, if the caller gives no number
+MODES = 13  # bending modes of the model, if the caller gives no number
 MOST_MODES = 40
 
 
@@ -539,11 +538,11 @@ def reduced_of(contents: FileContents) -> ReducedModel | None:
 def reduction_bytes(model: PlateModel, modes: int) -> int:
     """Return the bytes of the reduction of a plate to some bending modes."""
     n, in_plane = model.neq, int(np.count_nonzero(model.mesh.equations[:, :2]))
-    vectors = min(n, VECTORS_PER_MODE * modes + MORE_VECTORS)
+    vectors = 2 * min(n, VECTORS * modes)
     factors = factor_bytes(model, {"TANG"})
     return (
         ASSEMBLED * model.entries
         + factors
         + 8 * n * vectors
-        + max(bytes_of_pairs(model, in_plane, modes + 1), bytes_of_fields(model, modes))
+        + bytes_of_pairs(model, in_plane, modes + MOST_STATIC)
     )

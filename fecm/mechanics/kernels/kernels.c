@@ -105,7 +105,8 @@ typedef struct {
 /* Motion of a nonlinear plate in a few modes, and work arrays for its membrane forces; GROUPS numbers each. */
 typedef struct {
     half *q, *d, *f;    /* (coordinates,): displacements, their last increments, internal forces */
-    half *s, *n, *sums; /* (pairs,): products of coordinates, and forces on them; (rows,): products with `factor` */
+    half *z, *g;        /* (shapes + membrane,): amplitudes that the membrane sees, and forces on them */
+    half *s, *n, *sums; /* (pairs,): products of amplitudes, and forces on them; (rows,): products with `factor` */
     half *projectile;   /* (modes, GROUPS, 3): see Response */
 } Reduction;
 
@@ -547,16 +548,16 @@ EXPORT int fecm_sweep(const Sweep *x) {
 
 /* Compute impacts on a nonlinear plate in a few modes; returns 0 if there is not enough memory. */
 EXPORT int fecm_reduced(const Sweep *x, const Reduced *plate) {
-    const int64_t n = plate->coordinates, m = plate->bending, pairs = m * (m + 1) / 2;
-    const int64_t rows = plate->rank + n - plate->coupled;
-    const int64_t sizes[] = {n, n, n, pairs, pairs + TILE, rows + TILE, 3 * x->modes};
+    const int64_t n = plate->bending + plate->membrane, m = plate->shapes, pairs = m * (m + 1) / 2;
+    const int64_t seen = m + plate->membrane, rows = plate->rank + seen - plate->coupled;
+    const int64_t sizes[] = {n, n, n + TILE, seen + TILE, seen, pairs, pairs + TILE, rows + TILE, 3 * x->modes};
     int64_t size = 0;
-    for (int i = 0; i < 7; i++) size += GROUPS * sizes[i];
+    for (int i = 0; i < 9; i++) size += GROUPS * sizes[i];
     half *memory = malloc(sizeof(half) * size), *at = memory;
     if (!memory) return 0;
     Reduction r;
-    half **arrays[] = {&r.q, &r.d, &r.f, &r.s, &r.n, &r.sums, &r.projectile};
-    for (int i = 0; i < 7; at += GROUPS * sizes[i++]) *arrays[i] = at;
+    half **arrays[] = {&r.q, &r.d, &r.f, &r.z, &r.g, &r.s, &r.n, &r.sums, &r.projectile};
+    for (int i = 0; i < 9; at += GROUPS * sizes[i++]) *arrays[i] = at;
     for (int64_t first = 0; first < x->cases; first += CASES) CHOSEN(run_reduced)(x, plate, &r, first);
     free(memory);
     return 1;

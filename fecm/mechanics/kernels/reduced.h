@@ -3,9 +3,10 @@
  * The arithmetic is the same as in ReducedMotion of reduced_plate.py.  Cases are lanes, as in sweep.h.  The
  * coordinates move by central differences.  The projectile moves in its modes, step by step.
  *
- * Membrane.  The energy is 1/2 sum stiffness q^2 + q' C s + 1/2 |B s|^2, with s_ij = q_i q_j of the pairs i <= j of
- * bending modes.  B over C is one matrix G, whose product with s gives B s and the forces C s on the coordinates.
- * The product of G' with (B s, q) gives the forces on the pairs.  Only the rows of C that are not 0 are in G.
+ * Membrane.  The energy is 1/2 sum stiffness q^2 + z' C s + 1/2 |B s|^2, with s_ij = z_i z_j of the pairs i <= j of
+ * the amplitudes z of the bending, which the coordinates of the membrane follow in z.  B over C is one matrix G, whose
+ * product with s gives B s and the forces C s on z.  The product of G' with (B s, z) gives the forces on the pairs.
+ * Only the rows of C from the first one on that is not 0 are in G.
  *
  * Sums have a fixed order and no lane reads another lane, so that the result of a case does not depend on the other
  * cases, to the last bit.  A call runs in one thread and allocates nothing.
@@ -25,26 +26,31 @@ APART TARGET void NAME(multiply)(const double *A, int64_t rows, int64_t columns,
 
 /* Internal forces f of the coordinates q. */
 APART TARGET void NAME(internal)(const Reduced *p, const Reduction *r) {
-    const int64_t n = p->coordinates, m = p->bending, pairs = m * (m + 1) / 2, rows = p->rank + n - p->coupled;
+    const int64_t bent = GROUPS * p->bending, n = bent + GROUPS * p->membrane;
+    const int64_t m = p->shapes, pairs = m * (m + 1) / 2, seen = m + p->membrane, rows = p->rank + seen - p->coupled;
     half *s = r->s, *at = r->sums + GROUPS * p->rank;
+    NAME(multiply)(p->part, m, p->bending, r->q, r->z);
+    for (int64_t k = bent; k < n; k++) r->z[GROUPS * m + k - bent] = r->q[k];
     for (int64_t i = 0; i < m; i++)
-        for (int64_t k = GROUPS * i; k < GROUPS * m; k++) *s++ = r->q[GROUPS * i + k % GROUPS] * r->q[k];
+        for (int64_t k = GROUPS * i; k < GROUPS * m; k++) *s++ = r->z[GROUPS * i + k % GROUPS] * r->z[k];
     NAME(multiply)(p->factor, rows, pairs, r->s, r->sums);
-    for (int64_t i = 0; i < n; i++)
-        for (int g = 0; g < GROUPS; g++) r->f[GROUPS * i + g] = p->stiffness[i] * r->q[GROUPS * i + g];
-    for (int64_t k = GROUPS * p->coupled; k < GROUPS * n; k++, at++) r->f[k] += *at, *at = r->q[k];
+    memset(r->g, 0, sizeof(half) * GROUPS * p->coupled);
+    for (int64_t k = GROUPS * p->coupled; k < GROUPS * seen; k++, at++) r->g[k] = *at, *at = r->z[k];
     NAME(multiply)(p->transposed, pairs, rows, r->sums, r->n);
     const half *force = r->n;
     for (int64_t i = 0; i < m; i++) {
-        half sum[GROUPS] = {{0}}, q[GROUPS];
-        for (int g = 0; g < GROUPS; g++) q[g] = r->q[GROUPS * i + g];
+        half sum[GROUPS] = {{0}}, z[GROUPS];
+        for (int g = 0; g < GROUPS; g++) z[g] = r->z[GROUPS * i + g];
         for (int64_t j = i; j < m; j++)
             for (int g = 0; g < GROUPS; g++, force++) {
-                sum[g] += *force * r->q[GROUPS * j + g];
-                r->f[GROUPS * j + g] += *force * q[g];
+                sum[g] += *force * r->z[GROUPS * j + g];
+                r->g[GROUPS * j + g] += *force * z[g];
             }
-        for (int g = 0; g < GROUPS; g++) r->f[GROUPS * i + g] += sum[g];
+        for (int g = 0; g < GROUPS; g++) r->g[GROUPS * i + g] += sum[g];
     }
+    NAME(multiply)(p->spread, p->bending, m, r->g, r->f);
+    for (int64_t k = bent; k < n; k++) r->f[k] = r->g[GROUPS * m + k - bent];
+    for (int64_t k = 0; k < n; k++) r->f[k] += p->stiffness[k / GROUPS] * r->q[k];
 }
 
 /* Increment of coordinate i in the next step, under a contact force. */
@@ -58,7 +64,7 @@ INLINE half NAME(increment)(const Reduced *p, const Reduction *r, int64_t i, int
 APART TARGET void NAME(advance)(const Reduced *p, const Reduction *r, const Cases *cases, half *w, half *damped) {
     for (int g = 0; g < GROUPS; g++) {
         half moved = {0}, square = {0};
-        for (int64_t i = 0; i < p->coordinates; i++) {
+        for (int64_t i = 0; i < p->bending + p->membrane; i++) {
             const int64_t k = GROUPS * i + g;
             const half next = NAME(increment)(p, r, i, g, cases[g].force), v = p->rate[i] * (r->d[k] + next);
             square += v * v;
@@ -74,7 +80,7 @@ APART TARGET void NAME(advance)(const Reduced *p, const Reduction *r, const Case
  * U_2 + U_3 + U_4, of powers of q, does the work q f = 2 U_2 + 3 U_3 + 4 U_4. */
 INLINE half NAME(plate_energy)(const Reduced *p, const Reduction *r, int g, half force, half damped) {
     half square = {0}, work = {0}, second = {0}, fourth = {0};
-    for (int64_t i = 0; i < p->coordinates; i++) {
+    for (int64_t i = 0; i < p->bending + p->membrane; i++) {
         const int64_t k = GROUPS * i + g;
         const half v = p->rate[i] * (r->d[k] + NAME(increment)(p, r, i, g, force));
         square += v * v;
@@ -99,7 +105,7 @@ INLINE half NAME(free_tip)(const Sweep *x, const Reduction *r, int g) {
 
 /* Store the coordinates at the times that lie in a step, from row `row` on.  Gives the next row. */
 APART TARGET int64_t NAME(store_coordinates)(const Reduced *p, const Reduction *r, const Cases *cases, int64_t step, int64_t row) {
-    const int64_t n = p->coordinates;
+    const int64_t n = p->bending + p->membrane;
     for (; row < p->rows && p->step[row] == step; row++)
         for (int64_t k = 0; k < GROUPS * n; k++) {
             const half q = r->q[k] - p->back[row] * r->d[k];
@@ -116,7 +122,7 @@ TARGET void NAME(run_reduced)(const Sweep *x, const Reduced *p, const Reduction 
     half damped[GROUPS] = {{0}};
     double gain = 0.0;
     for (int64_t i = 0; i < x->modes; i++) gain += x->tip_shape[i] * x->h[2 * x->modes + i];
-    memset(r->q, 0, sizeof(half) * 3 * GROUPS * p->coordinates); /* d and f follow q */
+    memset(r->q, 0, sizeof(half) * 3 * GROUPS * (p->bending + p->membrane)); /* d and f follow q */
     memset(r->projectile, 0, sizeof(half) * 3 * GROUPS * x->modes);
     for (int g = 0; g < GROUPS; g++) {
         Cases *c = cases + g;

@@ -154,16 +154,18 @@ typedef struct {
     double *force, *found; /* (cases, steps), (FOUND, cases) */
 } Sweep;
 
-/* Nonlinear plate in n coordinates, `bending` modes followed by modes of the membrane; see reduced_plate.py.
+/* Nonlinear plate in n coordinates, `bending` ones followed by `membrane` ones; see reduced_plate.py.  The membrane
+ * sees `shapes` amplitudes of the bending.
  * Matrices are cut into tiles of four rows, filled up with zeros: (rows / 4, columns, 4). */
 typedef struct {
-    int64_t bending, coordinates;
-    int64_t rank, coupled; /* rows of B; first coordinate with a row of C, `coordinates` without one */
+    int64_t bending, membrane, shapes;
+    int64_t rank, coupled; /* rows of B; first row of C that is not 0, `shapes + membrane` without one */
     double flexibility, damping; /* displacement of a spring at the contact per force; a dt of the damping matrix a M */
     const double *stiffness, *deflection; /* (n,): squared angular frequency, displacement under the load */
     const double *keep, *share;           /* (n,): next increment per last one and per force */
     const double *rate;                   /* (n,): velocity per sum of the increments before and after */
-    const double *factor, *transposed;    /* B over C, (rank + n - coupled, pairs), and its transpose */
+    const double *part, *spread;          /* amplitudes, (shapes, bending), of the coordinates; its transpose */
+    const double *factor, *transposed;    /* B over C, (rank + shapes + membrane - coupled, pairs), and its transpose */
     int64_t rows;        /* times at which the coordinates are stored */
     const int64_t *step; /* (rows,): first step that ends at or after each time, from 0, ascending */
     const double *back;  /* (rows,): time from there to the end of the step, over the step */
