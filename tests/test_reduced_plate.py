@@ -103,7 +103,7 @@ def test_the_energy_is_that_of_the_elements_with_the_membrane_in_equilibrium(
     z = reduced.part @ (static * (1.0 + 0.5 * np.cos(np.arange(bending) + 1.0)))
     bent = reduced.part.T @ z / reduced.stiffness[:bending]
     largest = np.abs(reduced.fields.moving[:bending, :, 2].T @ bent).max()
-    z, bent = z * lam.thickness / largest, bent * lam.thickness / largest
+    z, bent = (1.5 * lam.thickness / largest * values for values in (z, bent))
     first, second = np.triu_indices(count)
     membrane = -(reduced.cubic[count:] @ (z[first] * z[second])) / reduced.stiffness[bending:]
     q = np.append(bent, membrane)
