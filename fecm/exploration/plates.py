@@ -47,7 +47,7 @@ from fecm.sweeps.backends import BendingModes, ImpulseResponse
 from fecm.sweeps.impact_columns import Impacts, impacts_of
 from fecm.sweeps.limits import PEAK_FORCE
 from fecm.sweeps.outcome import About, Status
-from fecm.sweeps.reduced import LIMIT, REDUCED, by_halvings
+from fecm.sweeps.reduced import LIMIT, MODES, REDUCED, by_halvings
 from fecm.sweeps.task import Settings
 
 # Factors on the deck's values at the ends of the sliders.
@@ -59,9 +59,6 @@ SPANS = {
 }
 # Deflections over the thickness at which the error of a linear plate is put into words.
 RATIOS = np.concatenate([np.arange(0.3, 1.0, 0.05), np.arange(1.0, 5.2, 0.25)])
-# Bending modes of a plate that stretches.  They give the peak force of a coupon of 2.1 mm in the
-# fixture of D7136 within 1 % of full runs up to a deflection of 1.7 thicknesses.
-MODES = 27
 # Factors on the deck's energy at which a plate in modes is compared with full runs: its own, and
 # the next ones until they agree.
 COMPARED = (1.0, SPANS["energy"][1], 2.5)
@@ -136,7 +133,7 @@ class ReducedPlate(PagePlate):
 
     modes = MODES
     model = f"Stretching plate in {MODES} bending modes"
-    options = f"--model {REDUCED} --modes {MODES}"
+    options = f"--model {REDUCED}"
     function = "fecm_reduced"
     draws, search = 200, (16, 4.0)
     unjudged = "failure of plies, slope and strain"

@@ -27,7 +27,6 @@ from fecm.sweeps.reduced import MODES
 
 USUAL_RUNS = 5  # of the deck and of fitted decks, and those of the errors of the plate
 NO_DIFFERENCE = (np.zeros(1), np.zeros(1))
-EXACT = 0.01  # error of the factor of the flexibility
 
 
 @dataclass(frozen=True)
@@ -93,7 +92,6 @@ class ModalPlate(ExactPlate):
 
     backend: BendingModes
     share: float = 1.0  # duration of the runs, over that of the program
-    softness: float = 1.0  # flexibility of the omitted modes, over that at rest
     difference: tuple[Floats, Floats] = NO_DIFFERENCE  # times, and force added to the trial forces
     is_exact: ClassVar[bool] = False
 
@@ -113,9 +111,7 @@ class ModalPlate(ExactPlate):
 
     @cached_property
     def _trials(self) -> BendingModes:
-        plate = self.backend.plate.plate
-        softened = replace(plate, flexibility=self.softness * plate.flexibility)
-        return replace(self.backend.lengthened(self.share), reduced=softened)
+        return self.backend.lengthened(self.share)
 
     def forces(
         self, impacts: Impacts, values: Sequence[Mapping[str, float]]
@@ -138,23 +134,11 @@ class ModalPlate(ExactPlate):
     def following(self, impact: Impacts, run: Outcome) -> Self:
         """Return the plate that has the force of the full run of an impact.
 
-        The reduced model has the omitted modes as a linear spring. In a plate that stretches, the
-        membrane stiffens them: the softness that gives the nearest force is taken. The difference
-        that is left is added to all forces.
+        The difference of the run from the plate is added to all forces.
         """
-        from scipy.optimize import minimize_scalar  # takes 0.2 s to import
-
-        def left(plate: ModalPlate) -> tuple[Floats, Floats]:
-            """Return the difference of the run from the plate."""
-            times, force = force_after(plate.outcomes(impact, judged=False))
-            return times, np.interp(times, *force_after(run), right=0.0) - force
-
-        def misfit(softness: float) -> float:
-            return float(np.mean(left(replace(self, softness=softness))[1] ** 2))
-
-        best = minimize_scalar(misfit, bounds=(0.0, 1.0), options={"xatol": EXACT})
-        nearest = replace(self, softness=float(best.x))
-        return replace(nearest, difference=left(nearest))
+        times, force = force_after(self.outcomes(impact, judged=False))
+        in_full = np.interp(times, *force_after(run), right=0.0)
+        return replace(self, difference=(times, in_full - force))
 
     def like(self, deck: Deck) -> ExactPlate:
         """Return the plate of another deck, in full runs as long as here."""
@@ -245,5 +229,5 @@ def plate_of_fit(deck: Deck, *, replaces_law: bool = False) -> ExactPlate:
             "stretches (NONL) needs: leave out the law, or NONL"
         )
     # With time steps of one size the forces are smooth functions of the trial values.
-    modes = BendingModes(problem, (), MODES, has_fields=False, halvings=1)
+    modes = BendingModes(problem, (), MODES, has_fields=False, halvings=0)
     return ModalPlate(problem, modes)

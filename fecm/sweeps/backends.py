@@ -23,7 +23,6 @@ from fecm.judge.limits import ENERGY_BALANCE
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import HystereticLaw, Law
 from fecm.mechanics.own_law import CaseByCase
-from fecm.mechanics.reduced_plate import ReducedPlate
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_model
 from fecm.problem.problem import Problem
@@ -132,7 +131,6 @@ class BendingModes:
     history: bool = True
     # Halvings of the time step of all impacts, at least; None if each has as many as it needs.
     halvings: int | None = None
-    reduced: ReducedPlate | None = None  # the plate, if it is reduced already
     longer_than: BendingModes | None = None  # the same plate in the program of the deck
     has_fields: bool = True  # without displacement fields, no outcome can be judged
     computes_together = False  # a search would try velocities far beyond the model
@@ -150,8 +148,6 @@ class BendingModes:
     @cached_property
     def plate(self) -> ReducedImpacts:
         """Impacts on the reduced plate; CasesError if it can't be reduced."""
-        if self.reduced is not None:
-            return impacts_on(self.reduced, self.problem)
         if self.longer_than is not None:
             return impacts_on(self.longer_than.plate.plate, self.problem)
         return reduced(self.problem, self.modes, has_fields=self.has_fields)
