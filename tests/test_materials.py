@@ -86,7 +86,7 @@ def test_damage_adds_strengths_and_toughness_in_the_decks_units(units: str) -> N
     assert allowables.s23 == allowables.s13 == allowables.s12
     assert delamination.toughness * pascal * metre == pytest.approx(787.9, rel=1e-5)
     every = {macro.word: macro.value for macro in deck.macros}
-    assert every["FAIL"] == every["DISP"]
+    assert every["DISP"] == 2.0 * every["FAIL"]
 
 
 def test_what_a_ply_lacks_is_told_or_refused() -> None:

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm._errors import StudyError
 from fecm.authoring.values import apply_case
 from fecm.deck.findings import Finding
 from fecm.deck.model import Boundary, Curvature, Delamination, Nonlinear, Preload, Shear
@@ -108,12 +107,6 @@ def test_a_nonlinear_plate_has_no_sparse_matrix_and_no_transposed_jacobian(tmp_p
     assert [file.name for file in tmp_path.iterdir()] == ["d.inp"]
     with pytest.raises(ValueError, match="take one of auto, kernels, numpy"):
         fecm.run(path, solver="csr")
-
-
-def test_identify_refuses_a_nonlinear_plate_and_names_the_way_out() -> None:
-    time = np.linspace(0.0, 1e-5, 30)
-    with pytest.raises(StudyError, match="below a quarter of the plate's thickness"):
-        fecm.identify(deck(), time, np.sin(time * 3e5), "k")
 
 
 # What is doubted ---------------------------------------------------------------------------------
