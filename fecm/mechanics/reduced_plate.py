@@ -12,7 +12,8 @@ the displacement under the load:
     W = sum g_i q_i + F/k_r,    1/k_r = 1/k_b - sum g_i^2/omega_i^2,
 
 with the displacement g_i of a vector under the load and the static stiffness k_b of the linear
-plate there.  Each vector adds g_i^2/omega_i^2 to the static compliance.
+plate there.  Each vector adds g_i^2/omega_i^2 to the static compliance.  Vectors of frequencies at
+which plate theory ends are scaled: this gives them mass and keeps their compliance.
 
 The membrane sees the projection of the deflection on few shapes of unit stiffness, z = P q: the
 vectors of the largest shares in the static compliance, and the static deflections.  The projection
@@ -101,6 +102,9 @@ UNMOVED = 1e-10
 INDEPENDENT, NEW = 1e-9, 1e-7
 # Share of the static compliance that is left to the spring; faster coordinates cost time steps.
 SPRING = 1e-4
+# Largest frequency of a coordinate, over that of shear through the thickness.  Faster coordinates
+# would cost time steps, and follow statically: they get more mass.
+CUT_OFF = 0.3
 # Lanczos vectors of the membrane, and the least share in the static compliance of a coordinate.
 MEMBRANE_VECTORS, MEMBRANE_SHARE = 12, 1e-3
 # Static deflections, over the thickness, whose shapes the plate has: the first, and the next ones
@@ -131,6 +135,16 @@ class RitzVectors(NamedTuple):
     def shares(self) -> Floats:
         """Static displacement of each vector under the unit load, (n,)."""
         return np.asarray(self.deflection**2 / self.stiffness)
+
+    def slowed(self, most: float) -> RitzVectors:
+        """Return vectors whose angular frequency is at most `most`: faster ones get more mass.
+
+        Their static displacements remain.
+        """
+        factor = np.minimum(1.0, most / np.sqrt(self.stiffness))
+        return RitzVectors(
+            factor**2 * self.stiffness, factor * self.shapes, factor * self.deflection
+        )
 
     def select(self, rows: Indices) -> RitzVectors:
         """Return some of the vectors."""
@@ -322,7 +336,8 @@ def reduced_plate(
     squares = np.vstack([vectors.shares / compliance, part**2 / vectors.stiffness])
     vectors = vectors.select(np.flatnonzero(squares.max(axis=0) > UNMOVED))
     coordinates = _slowest(vectors, compliance)
-    stiffest = coordinates.stiffness.max()
+    stiffest, fastest = coordinates.stiffness.max(), CUT_OFF * _cut_off(plate)
+    coordinates = coordinates.slowed(fastest)
     part = (plate.stiffness @ seen).T @ coordinates.shapes
     # Largest amplitude of each shape in the static deflections.
     force = BENT * plate.thicknesses.max() / compliance
@@ -339,7 +354,7 @@ def reduced_plate(
         first, second = np.triu_indices(seen.shape[1])
         pull = pairs.loads @ (static[-1][first] * static[-1][second])
         moved = _membrane_vectors(plane, in_plane, tangent, pull)
-        moved = moved.select(np.flatnonzero(moved.stiffness <= stiffest))
+        moved = moved.select(np.flatnonzero(moved.stiffness <= stiffest)).slowed(fastest)
         rows = moved.shapes.T @ pairs.loads
         quartic += (rows.T / moved.stiffness) @ rows
         cubic = np.concatenate([cubic, rows])
@@ -369,6 +384,18 @@ def reduced_plate(
         factor=factor_of((quartic + quartic.T) / 2.0, size, error),
         damping=damping,
         fields=fields,
+    )
+
+
+def _cut_off(plate: PlateModel) -> float:
+    """Return the lowest angular frequency of shear through the thickness, where plate theory ends.
+
+    In it rotations vibrate against the transverse shear stiffness (R. D. Mindlin, Journal of
+    Applied Mechanics 18, 1951, 31).
+    """
+    return min(
+        float(np.sqrt(np.linalg.eigvalsh(laminate.shear)[-1] / laminate.rotary_inertia))
+        for laminate in plate.laminates
     )
 
 

@@ -66,7 +66,7 @@ if TYPE_CHECKING:
 # Time step times the angular frequency of the fastest bending vector, of the contact on the plate,
 # and of the projectile on the contact.
 MODE_PHASE = 1.0
-PLATE_PHASE = 1.0
+PLATE_PHASE = 1.5
 PROJECTILE_PHASE = 0.2
 # A contact that is still stiffer is left to the balance of energy.
 MOST_HALVINGS = 10
