@@ -153,12 +153,20 @@ def _reduced_plate() -> Sequence[Value]:
     The value is the internal force of the first mode over its linear part.
     """
     codes = f"{QUARTER} 10101 01110"
-    plate = decks.material(ALUMINIUM, [0.0], THICKNESS)
+    material = decks.material(ALUMINIUM, [0.0], THICKNESS)
     side = 200.0 * THICKNESS
-    deck = decks.quarter_plate(4, plate, (), 0.0, codes, STRETCHES, side)
+    deck = decks.quarter_plate(4, material, (), 0.0, codes, STRETCHES, side)
     stretched = build_plate(deck, generate(deck))
     load = np.zeros((len(stretched.mesh.coordinates), 5))
     load[0, 2] = 1.0
-    mode = reduced_plate(stretched, load, 1)
-    q = np.array([[THICKNESS / mode.deflection[0]]])
-    return [float(mode.internal_forces(q)[0, 0] / (mode.stiffness[0] * q[0, 0]))]
+    plate = reduced_plate(stretched, load, 1)
+    bending = plate.bending
+    mode = int(np.argmax(plate.deflection[:bending] ** 2 / plate.stiffness[:bending]))
+    q = np.zeros(len(plate.stiffness))
+    q[mode] = THICKNESS / plate.deflection[mode]
+    first, second = np.triu_indices(plate.shapes)
+    z = plate.part @ q[:bending]
+    pull = plate.cubic[plate.shapes :] @ (z[first] * z[second])
+    q[bending:] = -pull / plate.stiffness[bending:]  # the membrane in equilibrium
+    force = plate.internal_forces(q[:, None])[mode, 0]
+    return [float(force / (plate.stiffness[mode] * q[mode]))]
