@@ -250,6 +250,12 @@ def test_the_default_mesh_of_a_window_has_elements_as_short_as_the_radius_of_the
 TEST = ("--fixture", "D7136", *PLATE, "--energy", "5J", "--kinematics", "linear")
 
 
+def test_a_window_that_only_pushes_has_200_rows_of_displacements_and_a_held_one_100() -> None:
+    for window, rows in (("push", 200), ("held", 100)):
+        (problem,) = load_deck(new(*TEST, "--window", window, *QUICK).stdout).problems
+        assert problem.stored_rows == {"RODP": 50, "DISP": rows}
+
+
 def test_a_window_that_only_pushes_has_supports_on_its_edges_and_holds_no_w() -> None:
     (problem,) = load_deck(new(*TEST, "--window", "push", *QUICK).stdout).problems
     (held,) = load_deck(new(*TEST, *QUICK).stdout).problems

@@ -17,10 +17,9 @@ from fecm._errors import StudyError
 from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_names
 from fecm.identification import confirmation
-from fecm.identification.expansion import Expansion
 from fecm.identification.fitting import FittedPoints, ForceModel, Scaling, fit_parameters
 from fecm.identification.identify import IdentificationJob
-from fecm.identification.plates import ExactPlate
+from fecm.identification.plates import ExactPlate, ForceExpansion
 from fecm.identification.result import Identification
 from fecm.problem.loading import sole_problem
 from fecm.report.content import render
@@ -190,13 +189,13 @@ def test_the_difference_from_the_full_run_is_in_summary_json_and_page() -> None:
 def test_a_fit_that_the_full_run_does_not_confirm_is_rejected(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    signs, at = itertools.cycle([1.0, -1.0]), Expansion.at
+    signs, at = itertools.cycle([1.0, -1.0]), ForceExpansion.at
 
-    def other_force(self: Expansion, trials: Sequence[Mapping[str, float]]) -> Floats:
+    def other_force(self: ForceExpansion, trials: Sequence[Mapping[str, float]]) -> Floats:
         """Forces that do not hold at the next values."""
         return at(self, trials) * (1.0 + 0.03 * next(signs))
 
-    monkeypatch.setattr(Expansion, "at", other_force)
+    monkeypatch.setattr(ForceExpansion, "at", other_force)
     monkeypatch.setattr(confirmation, "MOST_FITS", 1)
     (tmp_path / "d.inp").write_text(coupon().to_text())
     table = np.array([TIME, 1.1 * measured(0)]).T
@@ -235,6 +234,8 @@ def test_forces_near_a_full_run_are_linear_in_the_values_of_the_impact() -> None
     def force(values: Mapping[str, float]) -> Floats:
         return np.asarray((3.0 + 1e-3 * values["k"] + 0.2 * values["velocity"]) * shape)
 
-    expansion = Expansion(times, force(place), place, {"k": 1e-3 * shape, "velocity": 0.2 * shape})
+    expansion = ForceExpansion(
+        times, force(place), place, {"k": 1e-3 * shape, "velocity": 0.2 * shape}
+    )
     beside = [place, place | {"k": 1300.0, "delay": 1.0}, place | {"k": 900.0, "velocity": 47.0}]
     assert expansion.at(beside) == pytest.approx(np.stack([force(v) for v in beside], axis=1))

@@ -102,6 +102,8 @@ def impact_program(
     """
     steps = max(1, math.ceil(duration / dt - 1e-9))
     rows, every = max(1, steps // ROWS), EVERY
+    if deck.has(model.OneSidedSupports):  # the summary has the largest forces of their rows
+        every = {**EVERY, "DISP": 1}
     if options.every is not None:
         rows, every = options.every, dict.fromkeys(EVERY, 1)
     words = {"LMAS": 0.0, "DT": dt, "LOOP": float(steps), "TIME": 0.0}

@@ -128,7 +128,7 @@ class LinearPlate(PagePlate):
         }
 
 
-class ReducedPlate(PagePlate):
+class StretchingPlate(PagePlate):
     """A plate that stretches as it bends, in some bending modes."""
 
     modes = MODES
@@ -198,7 +198,7 @@ class ReducedPlate(PagePlate):
 
 
 # Kinds of plates by the segments that make a deck nonlinear.
-KINDS: Mapping[str, type[PagePlate]] = {"": LinearPlate, "NONL": ReducedPlate}
+KINDS: Mapping[str, type[PagePlate]] = {"": LinearPlate, "NONL": StretchingPlate}
 
 
 def page_plates(

@@ -196,7 +196,7 @@ function* work({number, plate: row, impact, scatter}) {
   say({draws, range, extended: inDeck < plate.steps && !isDecided(kernel.run([impact], inDeck)[0]), done: true});
 }
 
-/** Lowest velocity near that of the deck at which the peak of an impact reaches a force, as a sweep searches it. */
+/** Lowest velocity near the velocity of the deck at which the peak force reaches a force, found as a sweep finds it. */
 function* searched(impact, {strike, search: [count, span]}, force, many) {
   let trials = Array.from({length: count}, (_, n) => strike.velocity * span ** (2 * n / (count - 1) - 1));
   for (let round = 0; round < 12; round++) {

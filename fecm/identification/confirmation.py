@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.identification.expansion import Expansion
 from fecm.identification.fitting import (
     OF_RECORD,
     OFFSET,
@@ -25,7 +24,7 @@ from fecm.identification.fitting import (
     ForceModel,
     fitted,
 )
-from fecm.identification.plates import force_after
+from fecm.identification.plates import ForceExpansion, force_after
 from fecm.judge.fits import UNCONFIRMED, UNSETTLED
 from fecm.sweeps.impact_columns import impacts_from_cards
 from fecm.sweeps.outcome import About, Outcome
@@ -150,7 +149,7 @@ def _halfway(model: ForceModel, before: FittedPoints, after: FittedPoints) -> Fi
     return replace(middle, model=model.at(middle.time, [middle.values])[:, 0])
 
 
-def _expansion(model: ForceModel, points: FittedPoints, run: Outcome) -> Expansion:
+def _expansion(model: ForceModel, points: FittedPoints, run: Outcome) -> ForceExpansion:
     """Return the expansion about a full run, by full runs beside it.
 
     A derivative is left out, as 0, where a run fails.
@@ -169,7 +168,7 @@ def _expansion(model: ForceModel, points: FittedPoints, run: Outcome) -> Expansi
         if beside.fine[0]:
             change = values[name] - points.values[name]
             slopes[name] = (_force_at(times, beside) - force) / change
-    return Expansion(times, force, points.values, slopes)
+    return ForceExpansion(times, force, points.values, slopes)
 
 
 def _force_at(times: Floats, run: Outcome) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from fecm._typing import Floats
 from fecm.authoring.time_values import duration_of
 from fecm.deck.model import Deck
 from fecm.identification.alignment import IdentifyError
-from fecm.identification.expansion import Expansion
 from fecm.problem.loading import sole_problem
 from fecm.problem.problem import Problem
 from fecm.results.sinks import MemorySink
@@ -29,9 +28,28 @@ USUAL_RUNS = 5  # of the deck and of fitted decks, and those of the errors of th
 NO_DIFFERENCE = (np.zeros(1), np.zeros(1))
 
 
+class ForceExpansion(NamedTuple):
+    """Force of a full run, and its derivatives with respect to the values of the impact."""
+
+    times: Floats  # from 0 on
+    force: Floats  # (times,)
+    place: Mapping[str, float]  # values of the run
+    slopes: Mapping[str, Floats]  # derivatives by name, (times,) each
+
+    def at(self, trials: Sequence[Mapping[str, float]]) -> Floats:
+        """Return the forces at the values of trials, (times, trials)."""
+        columns = []
+        for trial in trials:
+            force = self.force
+            for name, slope in self.slopes.items():
+                force = force + (trial[name] - self.place[name]) * slope
+            columns.append(force)
+        return np.stack(columns, axis=1)
+
+
 @dataclass(frozen=True)
 class ExactPlate:
-    """Plate whose trial forces are those of full runs."""
+    """Plate whose trial forces are exact: a linear plate, or a plate in full runs."""
 
     problem: Problem
     backend: Backend
@@ -68,7 +86,7 @@ class ExactPlate:
         """Return the plate that has the force of the full run of an impact."""
         return self
 
-    def near(self, expansion: Expansion) -> ExpandedPlate:
+    def near(self, expansion: ForceExpansion) -> ExpandedPlate:
         """Return the plate with forces of full runs near one."""
         return ExpandedPlate(self.problem, self.backend, self, expansion)
 
@@ -159,7 +177,7 @@ class ExpandedPlate(ExactPlate):
     """Plate with forces of full runs near one."""
 
     plate: ExactPlate
-    expansion: Expansion
+    expansion: ForceExpansion
     is_exact: ClassVar[bool] = False
 
     @property
@@ -177,7 +195,7 @@ class ExpandedPlate(ExactPlate):
         """Return times from 0 on, and the forces at values, (times, values)."""
         return self.expansion.times, self.expansion.at(values)
 
-    def near(self, expansion: Expansion) -> ExpandedPlate:
+    def near(self, expansion: ForceExpansion) -> ExpandedPlate:
         """Return the plate with forces of full runs near another one."""
         return replace(self, expansion=expansion)
 

@@ -153,7 +153,7 @@ class RitzVectors(NamedTuple):
 
 @dataclass(frozen=True)
 class ReducedPlate:
-    """A plate in n coordinates: those of bending, followed by membrane modes.
+    """A plate in n coordinates: first those of bending, then those of the membrane.
 
     The membrane sees the amplitudes z = P q of some shapes, m of them.  Arrays over pairs have an
     entry for each of the m (m + 1)/2 pairs i <= j of shapes.
@@ -479,8 +479,8 @@ def ritz_vectors(
 def _slowest(vectors: RitzVectors, compliance: float) -> RitzVectors:
     """Return the slowest vectors that have the compliance but for a share :data:`SPRING`."""
     order = np.argsort(vectors.stiffness)
-    left = compliance - np.cumsum(vectors.shares[order])
-    return vectors.select(order[: np.count_nonzero(left > SPRING * compliance) + 1])
+    of_spring = compliance - np.cumsum(vectors.shares[order])
+    return vectors.select(order[: np.count_nonzero(of_spring > SPRING * compliance) + 1])
 
 
 def _unit(gram: Floats, least: float) -> Floats:
@@ -544,8 +544,8 @@ def _membrane_vectors(
     rigid = rigid_in_plane(plane, reduction)
     vectors = _lanczos(tangent, mass, tangent.solve(pull), MEMBRANE_VECTORS, rigid)
     stiffness = reduction.reduced(plane.stiffness, plane.mesh.equations > 0)
-    found = ritz_vectors(stiffness, mass, pull, vectors)
-    return found.select(np.flatnonzero(found.shares > MEMBRANE_SHARE * found.shares.sum()))
+    moved = ritz_vectors(stiffness, mass, pull, vectors)
+    return moved.select(np.flatnonzero(moved.shares > MEMBRANE_SHARE * moved.shares.sum()))
 
 
 def _lanczos(

@@ -6,23 +6,21 @@ In: displacement fields (fields, numnp, 5).  Out: energies and largest values of
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 
-from fecm._typing import Bools, Floats
+from fecm._typing import Floats
 from fecm.mechanics import strains as assumed_shear
 from fecm.mechanics.interpolation import interpolate, jacobian_determinants
 from fecm.mechanics.kernels import LIBRARY, Doubles, Structure, filled, floats
 from fecm.mechanics.kernels.strains import CompiledStrains, MidplaneStruct, StrainsStruct, midplane
 from fecm.mechanics.mesh import ElementBlock
-from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.stretching import (
     MidplaneField,
     Stretching,
     bending_stiffness,
     largest_principal,
-    nowhere,
 )
 
 ENERGIES, VALUES = 4, 7  # membrane, bending, preload, shear; slope, strain, force
@@ -66,16 +64,14 @@ class StretchedStruct(Structure):
 class CompiledStretching(Stretching):
     """Midplane that the compiled kernels evaluate."""
 
-    def __init__(
-        self,
-        plate: PlateModel,
-        near: Callable[[Floats, Floats], Bools] = nowhere,
-        load: tuple[float, float] | None = None,
-    ) -> None:
-        super().__init__(plate, near, load)
-        self._families = [self._structure(family) for family in plate.families]
-        self._loaded = [
-            midplane(part.block, part.rule, curvature=plate.curvature, nonlinear=True)
+    @cached_property
+    def _families(self) -> list[StretchedStruct]:
+        return [self._structure(family) for family in self._plate.families]
+
+    @cached_property
+    def _loaded(self) -> list[MidplaneStruct]:
+        return [
+            midplane(part.block, part.rule, curvature=self._plate.curvature, nonlinear=True)
             for part in self._at_load
         ]
 
