@@ -336,7 +336,7 @@ function options(out = []) {
   if (state.mass !== atRest.mass) values.mass = state.mass;
   if (state.law === "radius") values.radius = state.radius; else if (state.k !== atRest.k) values.k = state.k;
   if (state.giic !== atRest.giic) values.giic = state.giic;
-  if (shown.extended && !names.includes("duration")) values.duration = Number((plate.steps * plate.dt).toPrecision(6));
+  if (shown.extended && !names.includes("duration")) values.duration = Number(plate.duration.toPrecision(6));
   const all = [...Object.entries(values).filter(([name]) => !out.includes(name)), ...names.map(name => [name, state.plate[name]])];
   const rounded = value => typeof value === "number" ? Number(value.toPrecision(7)) : value;
   return [...all.map(([name, value]) => `--vary ${quoted(`${name}=${rounded(value)}`)}`), plate.options].filter(Boolean).join(" ");
@@ -416,7 +416,7 @@ function start() {
   worker.addEventListener("message", answered);
   worker.addEventListener("error", event => failed(event.message));
   worker.postMessage({data, kernel: byId("kernel").textContent, pins: state.pins.map(pin => question(pin.state))});
-  byId("about").textContent = `${first.model}, ${first.steps} steps of ${quantity("time", first.dt)}. Every force is computed in this page by the kernel of fecm.`;
+  byId("about").textContent = `${first.model}, steps of ${quantity("time", first.sizes[0].dt)}${first.resolved ? " or less" : ""}. Every force is computed in this page by the kernel of fecm.`;
   byId("notes").replaceChildren(...(data.notes.length ? [element("h3", {}, names.length ? "Notes of the run of the deck as it is" : "Notes of the deck's own run"), element("ul", {}, ...data.notes.map(text => element("li", {}, text)))] : []));
   byId("own-run").hidden = true;
   byId("page").hidden = false;

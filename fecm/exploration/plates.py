@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import product
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -47,7 +47,14 @@ from fecm.sweeps.backends import BendingModes, ImpulseResponse
 from fecm.sweeps.impact_columns import Impacts, impacts_of
 from fecm.sweeps.limits import PEAK_FORCE
 from fecm.sweeps.outcome import About, Status
-from fecm.sweeps.reduced import LIMIT, MODES, REDUCED, by_halvings
+from fecm.sweeps.reduced import (
+    LIMIT,
+    MODES,
+    PLATE_PHASE,
+    PROJECTILE_PHASE,
+    REDUCED,
+    by_halvings,
+)
 from fecm.sweeps.task import Settings
 
 # Factors on the deck's values at the ends of the sliders.
@@ -70,6 +77,14 @@ class ExploreError(FecmError, ValueError):
     """No page can be made of a deck."""
 
 
+class StepSize(NamedTuple):
+    """What the kernel takes to compute impacts with a time step."""
+
+    dt: float
+    steps: int
+    structures: Sequence[Structure]
+
+
 class PagePlate(ABC):
     """A plate of a page: how the kernel computes its impacts, and what bounds its model."""
 
@@ -81,14 +96,19 @@ class PagePlate(ABC):
     search: ClassVar[tuple[int, float]]  # velocities that a search tries first, and their span
     unjudged: ClassVar[str]
     price: ClassVar[str] = ""  # what takes long
+    node_mass = 0.0
 
     def __init__(self, problem: Problem, impacts: Impacts) -> None:
         self._problem, self._impacts = problem, impacts
-        self.dt, self.steps, self.node_mass = 0.0, 0, 0.0
 
     @abstractmethod
-    def structures(self, swept: Swept) -> Iterator[Structure]:
-        """Yield the arguments of the function."""
+    def sizes(self) -> Iterator[StepSize]:
+        """Yield the arguments of the function for each size of the time step, the largest first."""
+
+    @property
+    def resolved(self) -> dict[str, float] | None:
+        """What the largest time step of an impact follows from; None if all have the same."""
+        return None
 
     @abstractmethod
     def bounds(self, own: Result | None) -> Iterator[dict[str, Any]]:
@@ -109,13 +129,15 @@ class LinearPlate(PagePlate):
     def __init__(self, problem: Problem, impacts: Impacts) -> None:
         super().__init__(problem, impacts)
         self._response = _long_enough(ImpulseResponse(problem), problem, impacts).response
-        self.dt, self.steps = self._response.dt, self._response.steps
         self.node_mass = self._response.node_mass
 
-    def structures(self, swept: Swept) -> Iterator[Structure]:
+    def sizes(self) -> Iterator[StepSize]:
         """Yield the impacts with the response."""
         response = self._response
-        yield sweep_structure(response.response, response.mobility * response.dt**2, swept)
+        swept = _swept(self._impacts, response.dt, response.steps)
+        rigid = response.mobility * response.dt**2
+        structure = sweep_structure(response.response, rigid, swept)
+        yield StepSize(response.dt, response.steps, [structure])
 
     def bounds(self, own: Result | None) -> Iterator[dict[str, Any]]:
         """Yield the limit of the deflection, with the error of the force beyond it."""
@@ -145,14 +167,32 @@ class StretchingPlate(PagePlate):
         super().__init__(problem, impacts)
         modes = BendingModes(problem, (), MODES, history=False, has_fields=False)
         self._backend = _long_enough(modes, problem, impacts)
-        plate = self._backend.plate
-        self._plate = plate.halved(max(by_halvings(plate, _corners(problem, impacts, "k"))))
-        self.dt, self.steps = self._plate.dt, self._plate.steps
 
-    def structures(self, swept: Swept) -> Iterator[Structure]:
-        """Yield the impacts, and the plate."""
-        yield sweep_structure(np.empty(0), 0.0, swept)
-        yield motion_struct(self._plate.plate, self.dt)
+    def sizes(self) -> Iterator[StepSize]:
+        """Yield the impacts and the plate, as many times as a sweep may halve the time step."""
+        plate = self._backend.plate
+        most = max(by_halvings(plate, _corners(self._problem, self._impacts, "k")))
+        for times in range(most + 2):  # a search goes beyond the sliders
+            halved = plate.halved(times)
+            swept = _swept(self._impacts, halved.dt, halved.steps)
+            structures = (
+                sweep_structure(np.empty(0), 0.0, swept),
+                motion_struct(plate.plate, halved.dt),
+            )
+            yield StepSize(halved.dt, halved.steps, structures)
+
+    @property
+    def resolved(self) -> dict[str, float] | None:
+        """Constants of :func:`~fecm.sweeps.reduced.largest_time_steps`."""
+        plate = self._backend.plate.plate
+        return {
+            "platePhase": PLATE_PHASE,
+            "projectilePhase": PROJECTILE_PHASE,
+            "flexibility": plate.flexibility,
+            "mobility": float((plate.deflection**2).sum()),
+            # Infinite for a rigid mass.
+            "elementTime": min(self._impacts.kinds[0].element_time, 1e300),
+        }
 
     def bounds(self, own: Result | None) -> Iterator[dict[str, Any]]:
         """Yield the largest energy at which the peak force agrees with a full run."""
@@ -211,6 +251,7 @@ def page_plates(
         if impacts is None:
             raise CasesError(faults[0])
         plate = kind(problem, impacts)
+        sizes, arrays = [*plate.sizes()], dict[str, int]()
         yield {
             "values": {name: str(value) for name, value in case.items()},
             "model": plate.model,
@@ -218,14 +259,22 @@ def page_plates(
             "function": plate.function,
             "draws": plate.draws,
             "search": plate.search,
-            "dt": plate.dt,
-            "steps": plate.steps,
+            "resolved": plate.resolved,
+            "duration": sizes[0].dt * sizes[0].steps,
             "program": duration_of(problem),
             "nodeMass": plate.node_mass,
             "mobility": problem.judge.mobility,
             "mass": problem.judge.plate_mass,
             "thickness": problem.judge.thickness,
-            "structures": [*map(_encoded, plate.structures(_swept(plate, impacts)))],
+            "sizes": [
+                {
+                    "dt": size.dt,
+                    "steps": size.steps,
+                    "structures": [_encoded(structure, arrays) for structure in size.structures],
+                }
+                for size in sizes
+            ],
+            "arrays": [*arrays],
             "strike": _strike(problem, impacts),
             "threshold": _threshold(problem),
             "bounds": [*plate.bounds(None if case else own), *_bounds(problem)],
@@ -274,24 +323,32 @@ def _long_enough(backend: Lengthened, problem: Problem, impacts: Impacts) -> Len
     return longer
 
 
-def _swept(plate: PagePlate, impacts: Impacts) -> Swept:
+def _swept(impacts: Impacts, dt: float, steps: int) -> Swept:
     """Return the projectile and the law of impacts, whose values the page gives."""
     rod, none = impacts.kinds[0], np.empty((0, 0))
-    step = WilsonStep(rod.stiffness(), rod.mass(), plate.dt, rigid=rod.rigid)
+    step = WilsonStep(rod.stiffness(), rod.mass(), dt, rigid=rod.rigid)
     modes = ProjectileModes.of(rod.stiffness(), rod.mass(), rod.rigid)
     law = kernel_law(impacts.constants)
-    return Swept(modes, step, law.kind, none, np.empty((1, plate.steps)), none)
+    return Swept(modes, step, law.kind, none, np.empty((1, steps)), none)
 
 
 # Arrays of a call, which the page allocates.
 OF_CALL = ("given", "force", "found")
 
 
-def _encoded(structure: Structure) -> list[list[Any]]:
-    """Return the fields of a structure: name, kind, offset, and value; None for missing arrays."""
+def _encoded(structure: Structure, arrays: dict[str, int]) -> list[list[Any]]:
+    """Return the fields of a structure: name, kind, offset, and value.
+
+    The value of an array is its number in `arrays`, which has each once; None for missing arrays.
+    """
     values = {name: value for name, value in structure.held.items() if name not in OF_CALL}
     return [
-        [*field, encoded(value) if isinstance(value, np.ndarray) else value]
+        [
+            *field,
+            arrays.setdefault(encoded(value), len(arrays))
+            if isinstance(value, np.ndarray)
+            else value,
+        ]
         for field in wasm_fields(type(structure))
         for value in [values.get(field.name)]
     ]
@@ -315,6 +372,7 @@ def _strike(problem: Problem, impacts: Impacts) -> dict[str, Any]:
         "scales": _scales(impacts),
         "k": float(impacts.constants.k[0]),
         "q": float(np.ravel(impacts.constants.q)[0]),
+        "law": law.kind.name,
         "critical": float(np.ravel(law.critical)[0]),
         "slope": float(np.ravel(law.slope)[0]),
         "unitK": unit_k,

@@ -36,58 +36,66 @@ class Kernel {
     this.places.forEach(this.exports.free);
     this.places = [];
     this.plate = plate;
-    this.enough = Math.ceil(plate.steps / 4);
+    this.enough = plate.duration / 4;
     this.at = {given: this.put(new Float64Array(data.given.length * LANES)),
                found: this.put(new Float64Array(data.found.length * LANES)),
-               force: this.put(new Float64Array(plate.steps * LANES))};
-    const own = {...this.at, stride: LANES};
-    this.structures = plate.structures.map(fields => {
-      const values = fields.map(([name, kind, , value]) =>
-        name in own ? own[name] : kind === "pointer" ? value && this.put(bytes(value)) : value);
+               force: this.put(new Float64Array(plate.sizes.at(-1).steps * LANES))};
+    const own = {...this.at, stride: LANES}, arrays = plate.arrays.map(text => this.put(bytes(text)));
+    this.structures = new Map(plate.sizes.map(size => [size, size.structures.map(fields => {
       const view = new DataView(new ArrayBuffer(512));
-      fields.forEach(([, kind, offset], n) => {
-        if (kind === "pointer") view.setUint32(offset, values[n] ?? 0, true);
-        else if (kind === "double") view.setFloat64(offset, values[n], true);
-        else view.setBigInt64(offset, BigInt(values[n]), true);
-      });
+      for (const [name, kind, offset, value] of fields)
+        if (kind === "pointer") view.setUint32(offset, own[name] ?? arrays[value] ?? 0, true);
+        else if (kind === "double") view.setFloat64(offset, value, true);
+        else view.setBigInt64(offset, BigInt(own[name] ?? value), true);
       return this.put(view);
-    });
+    })]));
   }
 
   doubles(at, count) { return new Float64Array(this.exports.memory.buffer, at, count); }
 
-  /** Compute up to LANES impacts, and give the summary of each. */
-  run(impacts, steps) {
-    const {plate} = this, {strike} = plate;
+  /** Compute up to LANES impacts with the time step of the first, for a time, and give the summary of each. */
+  run(impacts, time) {
+    const {plate} = this, {strike} = plate, size = sizeOf(plate, impacts[0]), steps = Math.min(size.steps, Math.round(time / size.dt));
     const rows = {K: i => i.k, Q: () => strike.q, CRITICAL: () => strike.critical, SLOPE: () => strike.slope,
                   VELOCITY: i => i.velocity, FACTOR: i => i.mass / strike.unitMass};
     const given = this.doubles(this.at.given, data.given.length * LANES);
     data.given.forEach((name, row) => impacts.forEach((impact, lane) => { given[row * LANES + lane] = rows[name](impact); }));
-    const sizes = {cases: impacts.length, steps}, view = new DataView(this.exports.memory.buffer, this.structures[0]);
-    for (const [name, , offset] of plate.structures[0]) if (name in sizes) view.setBigInt64(offset, BigInt(sizes[name]), true);
-    if (!this.exports[plate.function](...this.structures)) throw new Error("there is not enough memory");
+    const sizes = {cases: impacts.length, steps}, structures = this.structures.get(size);
+    const view = new DataView(this.exports.memory.buffer, structures[0]);
+    for (const [name, , offset] of size.structures[0]) if (name in sizes) view.setBigInt64(offset, BigInt(sizes[name]), true);
+    if (!this.exports[plate.function](...structures)) throw new Error("there is not enough memory");
     const force = this.doubles(this.at.force, steps * impacts.length), found = this.doubles(this.at.found, data.found.length * LANES);
-    return impacts.map((impact, lane) => summary(plate, impact, force.subarray(lane * steps, (lane + 1) * steps),
+    return impacts.map((impact, lane) => summary(plate, size.dt, impact, force.subarray(lane * steps, (lane + 1) * steps),
       Object.fromEntries(data.found.map((name, row) => [name, found[row * LANES + lane]]))));
   }
 
-  /** Compute an impact in as few steps as are likely to decide it, and in all if these do not. */
+  /** Compute an impact for as long as is likely to decide it, and for all of the time if that does not. */
   one(impact) {
-    const {steps} = this.plate;
-    let [result] = this.run([impact], Math.min(steps, this.enough));
-    if (!isDecided(result)) [result] = this.run([impact], steps);
-    this.enough = Math.ceil(1.15 * result.contactEnd / this.plate.dt) + LANES;
+    let [result] = this.run([impact], this.enough);
+    if (!isDecided(result)) [result] = this.run([impact], this.plate.duration);
+    this.enough = 1.15 * result.contactEnd + LANES * result.dt;
     return {...result, force: result.force.slice()};
   }
 
   /** Compute impacts whose peaks are wanted, in a short run, and those that it leaves open in a long one. */
-  peaks(impacts, steps) {
-    const results = this.run(impacts, steps);
-    const open = steps < this.plate.steps ? results.flatMap((result, row) => isNaN(result.peak_force) ? [row] : []) : [];
+  peaks(impacts, time) {
+    const results = this.run(impacts, time);
+    const open = time < this.plate.duration ? results.flatMap((result, row) => isNaN(result.peak_force) ? [row] : []) : [];
     if (open.length)
-      this.run(open.map(row => impacts[row]), this.plate.steps).forEach((result, index) => { results[open[index]] = result; });
+      this.run(open.map(row => impacts[row]), this.plate.duration).forEach((result, index) => { results[open[index]] = result; });
     return results;
   }
+}
+
+/** The largest step that resolves the contact of an impact, as `largest_time_steps` of fecm/sweeps/reduced.py has it. */
+function sizeOf({resolved, strike, sizes}, {velocity, mass, k}) {
+  if (!resolved) return sizes[0];
+  const force = (1.25 * mass * velocity ** 2 * k ** (2 / 3)) ** 0.6, deepest = (force / k) ** (2 / 3);
+  const permanent = strike.law === "LINEAR" ? strike.slope * (deepest - strike.critical) : deepest - strike.critical ** 0.4 * deepest ** 0.6;
+  const compliance = Math.min(deepest / 1.5, (deepest - Math.max(permanent, 0)) / strike.q) / force + resolved.flexibility;
+  const largest = Math.min(resolved.platePhase * Math.sqrt(compliance / resolved.mobility),
+    resolved.projectilePhase * Math.sqrt(compliance * mass), resolved.elementTime);
+  return sizes.find(({dt}) => dt <= largest) ?? sizes.at(-1);
 }
 
 // Numbers of an impact ------------------------------------------------------------------------------------------
@@ -96,8 +104,8 @@ const energyOf = (plate, {mass, velocity}) => 0.5 * plate.strike.factor * mass *
 const isDecided = result => result.over && !isNaN(result.max_deflection);
 
 /** What fecm/results/metrics.py takes from the forces of a case; NaN where its end has not decided a value. */
-function summary(plate, impact, force, found) {
-  const {mass, velocity} = impact, {factor} = plate.strike, {dt} = plate, steps = force.length, end = steps * dt;
+function summary(plate, dt, impact, force, found) {
+  const {mass, velocity} = impact, {factor} = plate.strike, steps = force.length, end = steps * dt;
   let impulse = 0, lever = 0, peak = 0, peakAt = 0, touching = 0, contacts = 0, lastAt = -1, begin = 0;
   for (let n = 0; n < steps; n++) {
     const f = force[n];
@@ -162,15 +170,19 @@ function* kept(name, key, compute) {
 function* work({number, plate: row, impact, scatter}) {
   const plate = data.plates[row], say = parts => postMessage({number, ...parts}), {mass, k, giic} = impact;
   if (kernel.plate !== plate) kernel.load(plate);
-  const now = kernel.one(impact), steps = Math.min(plate.steps, kernel.enough);
+  const now = kernel.one(impact), time = kernel.enough;
   say({now, plate: row});
   yield;
   const energy = velocity => energyOf(plate, {mass, velocity}), speed = value => Math.sqrt(2 * value / plate.strike.factor / mass);
   const many = function* (impacts) {
-    const results = [];
-    for (let n = 0; n < impacts.length; n += LANES) {
-      results.push(...kernel.peaks(impacts.slice(n, n + LANES), steps).map(({reached, peak_force}) => ({reached, peak_force})));
-      yield;
+    const results = [], steps = impacts.map(one => sizeOf(plate, one));
+    for (const size of plate.sizes) {
+      const rows = impacts.flatMap((_, row) => steps[row] === size ? [row] : []);
+      for (let n = 0; n < rows.length; n += LANES) {
+        const some = rows.slice(n, n + LANES);
+        kernel.peaks(some.map(row => impacts[row]), time).forEach(({reached, peak_force}, index) => { results[some[index]] = {reached, peak_force}; });
+        yield;
+      }
     }
     return results;
   };
@@ -192,8 +204,8 @@ function* work({number, plate: row, impact, scatter}) {
     }
   const draws = now.limit > 0 && Object.values(scatter).some(size => size > 0) ? yield* drawn(impact, plate, scatter, many) : null;
   // The page goes on for longer than the program of the deck, where the impact does.
-  const inDeck = Math.round(plate.program / plate.dt);
-  say({draws, range, extended: inDeck < plate.steps && !isDecided(kernel.run([impact], inDeck)[0]), done: true});
+  const isLonger = plate.duration > 1.001 * plate.program;
+  say({draws, range, extended: isLonger && !isDecided(kernel.run([impact], plate.program)[0]), done: true});
 }
 
 /** Lowest velocity near the velocity of the deck at which the peak force reaches a force, found as a sweep finds it. */
