@@ -34,6 +34,7 @@ NAMED = [f"{name}=" for name in PLATE_NAMES]
     epilog=typical(
         "fecm explore drop-weight-held.inp",
         "fecm explore drop-weight-held.inp --vary ply_thickness=.125,.184 -o plies.html --open",
+        "fecm explore drop-weight-held.inp --modes 60 -o places.html",
     ),
 )
 @click.argument("deck", type=DECK_PATH)
@@ -43,6 +44,7 @@ NAMED = [f"{name}=" for name in PLATE_NAMES]
     overlay={"type": DECK_PATH},
     columns={"type": PAIR},
     units={"type": PAIR},
+    modes={"type": click.IntRange(min=0)},
 )
 @option(
     "-o",
@@ -62,7 +64,8 @@ def explore_command(
     the plate delaminates, and the chance that it does.  The page is one file with the kernel of the
     sweeps inside: it opens in a browser, from a folder or a mail, without a network.  It says how
     far the model holds, and the command that computes each state again.  A plate with NONL is
-    reduced to bending modes, and compared with full runs before the page is written.
+    reduced to bending modes, and compared with full runs before the page is written.  With --modes,
+    a click moves the impact on a linear plate.
     """
     path = output or Path(f"{deck.stem}-explore.html")
     check_page(path, overwrite, [deck, *filter(None, [options["overlay"]])])

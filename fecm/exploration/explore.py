@@ -14,7 +14,7 @@ from typing import Any
 from fecm._files import beside, check_outputs
 from fecm._options import documented, option, with_parameters_of
 from fecm.authoring.strike_values import strike_of
-from fecm.authoring.values import OF_PLATE
+from fecm.authoring.values import OF_PLATE, Changes, names_of
 from fecm.deck.catalogue import system_of
 from fecm.deck.units import PREFIXED, PREFIXES, in_si, unit_names, unit_of
 from fecm.exploration.page import page
@@ -117,6 +117,14 @@ class Exploration:
         None, "Its units, if it names none.", group="Page", metavar="TIME,FORCE"
     )
 
+    modes: int = option(
+        0,
+        "Natural modes that give the response at other places: the impact can be moved, by a click "
+        "on the plate. Some 60 are enough; with 0 it stays.",
+        group="Page",
+        metavar="N",
+    )
+
     def __post_init__(self) -> None:
         loaded = load_deck(self.deck)
         problem = load_one(loaded)
@@ -132,6 +140,10 @@ class Exploration:
                 "other steps, nodal forces or prescribed displacements"
             )
         self._kind = KINDS[words]
+        if self.modes:
+            self._kind.check_places(problem)
+            if moving := [name for name in cases[0] if name in names_of(Changes.PLACE)]:
+                raise ExploreError(f"{moving[0]} moves the impact, as a click does: leave it out")
         self._plan = plan(problem, cases, modes=self._kind.modes)
         if not strike_of(problem.deck).velocity:
             raise ExploreError(
@@ -162,13 +174,14 @@ class Exploration:
         """The page."""
         result = run_quietly(self._problem.deck)  # the page has its notes
         plates, size, cases = [], 0, self._plan.cases
-        for plate in page_plates(self._kind, self._plan.settings, cases, result):
+        for plate in page_plates(self._kind, self._plan.settings, cases, result, self.modes):
             plates.append(plate)
             size += len(json.dumps(plate))
             if size > MOST:
                 raise ExploreError(
                     f"{len(plates)} of {len(cases)} plates take {size / 1e6:.3g} MB, and a page "
                     f"has at most {MOST / 1e6:g} MB: leave out values of `vary`, or shorten the run"
+                    + (", or take fewer modes" if self.modes else "")
                 )
         deck, names = self._problem.deck, unit_names(self._problem.deck)
         units = {name: unit_of(dimension, names) for name, dimension in DIMENSIONS.items()}

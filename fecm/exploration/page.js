@@ -8,7 +8,8 @@ const PINS = 3;
 
 /** Judgements of a result, in the words of the package's limits. */
 function judgements(plate, result) {
-  const rows = plate.bounds.filter(bound => !isNaN(result[bound.of])).map(bound => {
+  const isMoved = result.place !== null, bounds = [...plate.bounds, ...(isMoved ? [plate.places.bound] : [])];
+  const rows = bounds.filter(bound => !isNaN(result[bound.of])).map(bound => {
     const value = result[bound.of], size = value / (bound.scale ?? 1), isBeyond = value > bound.most;
     const more = isBeyond && bound.beyond?.findLast(([at]) => at <= size + 0.025);
     return {quantity: bound.quantity, size: quantity(bound.unit ?? "none", size, 3), level: isBeyond ? bound.level : "within range",
@@ -16,7 +17,8 @@ function judgements(plate, result) {
   });
   const [level, words] = data.ends.words[result.end];
   return [...rows, {quantity: "end of the contact", size: result.end, level, words},
-    {quantity: plate.unjudged, size: "–", level: "not judged", words: "this page has forces only: a run with FAIL has the exposures"}];
+    {quantity: plate.unjudged, size: "–", level: "not judged", words: "this page has forces only: a run with FAIL has the exposures"},
+    ...(isMoved ? [{quantity: "supports that pull", size: "–", level: "not judged", words: "the notes below are of the deck's place: a run has those of this place"}] : [])];
 }
 
 // Texts ---------------------------------------------------------------------------------------------------------
@@ -124,11 +126,20 @@ const first = data.plates[0], names = Object.keys(first.values);
 const energyOf = (strike, velocity = strike.velocity) => 0.5 * strike.factor * strike.mass * velocity ** 2;
 const atRest = {
   plate: first.values, speed: "energy", energy: energyOf(first.strike), mass: first.strike.mass, law: "k", k: first.strike.k,
-  giic: first.threshold?.toughness ?? null, scatter: {energy: 0, k: 0, giic: 0}, pins: [],
+  place: null, giic: first.threshold?.toughness ?? null, scatter: {energy: 0, k: 0, giic: 0}, pins: [],
 };
 let state = structuredClone(atRest);
 
 const plateOf = wanted => data.plates.find(plate => names.every(name => plate.values[name] === wanted.plate[name])) ?? first;
+
+/** Number of the place that is nearest to a point; null for the deck's. */
+function nearest({at, own}, [x, y]) {
+  const distances = [own, ...at].map(one => Math.hypot(one[0] - x, one[1] - y));
+  const n = distances.indexOf(Math.min(...distances));
+  return n ? n - 1 : null;
+}
+
+const placeOf = (wanted, {places} = plateOf(wanted)) => wanted.place && places ? nearest(places, wanted.place) : null;
 
 /** Impact of a state on its plate. */
 function impactOf(wanted, plate = plateOf(wanted)) {
@@ -183,7 +194,7 @@ function build() {
     const values = [...new Set(data.plates.map(plate => plate.values[name]))];
     const select = element("select", {id: `plate-${row}`}, ...values.map(value => element("option", {value}, value)));
     select.value = state.plate[name];
-    select.addEventListener("change", () => { state.plate = {...state.plate, [name]: select.value}; changed(); });
+    select.addEventListener("change", () => { state.plate = {...state.plate, [name]: select.value}; build(); changed(); });
     fieldset("Plate").append(element("div", {class: "row choice"}, element("label", {for: select.id}, name.replaceAll("_", " ")), select));
   });
   choice("Impact", "speed", "given by", [["energy", "energy"], ["velocity", "velocity"], ...(data.gravity ? [["height", "drop height"]] : [])]);
@@ -191,8 +202,41 @@ function build() {
     if (slider.group === "Contact" && first.strike.unitK) choice("Contact", "law", "given by", [["k", "k"], ["radius", "steel tip (estimate)"]]);
     fieldset(slider.group).append(row(slider));
   }
+  if (plateOf(state).places) fieldset("Place").append(...placing(plateOf(state).places));
   byId("sliders").replaceChildren(...groups.values());
   if (focus) byId(focus)?.focus({preventScroll: true});
+}
+
+/** Picture of the plate with the places of the impact, and fields of the present one. */
+function placing(places) {
+  const {at, own, extent: [left, low, right, high]} = places, now = at[placeOf(state)] ?? own, [x, y] = now;
+  const size = Math.max(right - left, high - low), pad = 0.04 * size, shape = (name, attributes) => element(name, {svg: true, ...attributes});
+  const move = point => { const n = nearest(places, point); state.place = n === null ? null : at[n]; build(); changed(); };
+  const svg = element("svg", {svg: true, id: "place", class: "chart", tabindex: 0, role: "application",
+    viewBox: `${left - pad} ${-high - pad} ${right - left + 2 * pad} ${high - low + 2 * pad}`,
+    "aria-label": `Plate with the impact at ${quantity("height", x)}, ${quantity("height", y)}; arrow keys move it`},
+  element("g", {svg: true, transform: "scale(1 -1)"}, shape("path", {class: "axis", d: places.outline}), shape("path", {class: "held", d: places.supports}),
+    shape("path", {class: "places", d: at.map(one => `M${one[0]} ${one[1]}h0`).join("")}), shape("circle", {class: "mark", cx: x, cy: y, r: 0.02 * size})));
+  svg.addEventListener("click", event => {
+    const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+    move([point.x, -point.y]);
+  });
+  svg.addEventListener("keydown", event => {
+    const way = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key];
+    if (!way) return;
+    event.preventDefault();
+    const ahead = [own, ...at].map(one => {
+      const along = (one[0] - x) * way[0] + (one[1] - y) * way[1], aside = Math.abs((one[0] - x) * way[1] + (one[1] - y) * way[0]);
+      return {one, far: along > 1e-6 * size && aside <= along ? along + 2 * aside : Infinity};
+    }).reduce((best, next) => next.far < best.far ? next : best);
+    if (ahead.far < Infinity) move(ahead.one);
+  });
+  const fields = ["x", "y"].map((name, axis) => {
+    const field = element("input", {type: "number", id: `place-${name}`, step: "any", value: digits(now[axis]), "aria-label": `Place: ${name} (${data.units.height[0]})`});
+    field.addEventListener("change", () => move(axis ? [x, Number(field.value)] : [Number(field.value), y]));
+    return element("div", {class: "row"}, element("label", {for: field.id}, name), field, element("span", {}, data.units.height[0]));
+  });
+  return [svg, element("p", {class: "hint"}, "A click or an arrow key moves the impact to a dot: a node at which a run has no other warnings than at the deck's place."), ...fields];
 }
 
 /** Slider and field of a value.  The slider is logarithmic, except of a scatter in per cent. */
@@ -224,7 +268,7 @@ function row({group, name, label, ends, scatter}) {
 // Worker --------------------------------------------------------------------------------------------------------
 
 let worker, asked = 0, now, frame = null;
-const shown = {number: 0, plate: 0, found: null, range: [], curve: null, draws: null, extended: false, done: false};
+const shown = {number: 0, plate: 0, found: null, range: [], curve: null, draws: null, modal: NaN, extended: false, done: false};
 
 /** Ask the worker for the state of the sliders; what is shown stays until the answer is there. */
 function changed() {
@@ -234,7 +278,7 @@ function changed() {
   pending();
 }
 
-const question = wanted => ({plate: data.plates.indexOf(plateOf(wanted)), impact: impactOf(wanted)});
+const question = wanted => ({plate: data.plates.indexOf(plateOf(wanted)), place: placeOf(wanted), impact: impactOf(wanted)});
 
 function answered({data: answer}) {
   if (answer.pins) answer.pins.forEach((result, n) => { state.pins[n].result = result; });
@@ -256,7 +300,7 @@ const SHOWN = ["peak_force", "time_of_peak", "contacts", "contact_time", "max_de
                "impulse", "rebound_velocity", "energy_absorbed", "contact_loop"];
 
 function draw() {
-  const plate = data.plates[shown.plate], {pins} = state, rows = judgements(plate, now), {found} = shown, {energy} = now;
+  const plate = data.plates[shown.plate], {pins} = state, rows = judgements(plate, {...now, modal: shown.modal}), {found} = shown, {energy} = now;
   const delaminates = now.limit > 0 ? now.reached >= now.limit : null;
   const level = now.limit > 0 ? {value: now.limit, label: "delamination threshold"} : null;
   const band = level && plate.threshold.band.map(force => force * now.limit / plate.threshold.force);
@@ -336,6 +380,7 @@ function options(out = []) {
   if (state.mass !== atRest.mass) values.mass = state.mass;
   if (state.law === "radius") values.radius = state.radius; else if (state.k !== atRest.k) values.k = state.k;
   if (state.giic !== atRest.giic) values.giic = state.giic;
+  if (placeOf(state) !== null) values.at = state.place.map(value => Number(value.toPrecision(7))).join(",");
   if (shown.extended && !names.includes("duration")) values.duration = Number(plate.duration.toPrecision(6));
   const all = [...Object.entries(values).filter(([name]) => !out.includes(name)), ...names.map(name => [name, state.plate[name]])];
   const rounded = value => typeof value === "number" ? Number(value.toPrecision(7)) : value;
@@ -387,6 +432,10 @@ function take(given) {
   }
   const plate = data.plates.find(one => names.every(name => one.values[name] === given.plate?.[name]));
   if (plate) state.plate = plate.values;
+  if (Array.isArray(given.place) && given.place.length === 2 && given.place.every(Number.isFinite)) {
+    const {places} = plateOf(state), n = placeOf({...state, place: given.place});
+    state.place = n === null ? null : places.at[n];
+  }
   for (const pin of Array.isArray(given.pins) ? given.pins.slice(0, PINS) : []) addPin(pin?.state);
 }
 

@@ -11,6 +11,7 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import product
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
@@ -24,6 +25,7 @@ from fecm.authoring.time_values import duration_of, with_clock
 from fecm.authoring.values import apply_case
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
+from fecm.exploration.places import ModalPlate, picture
 from fecm.judge.limits import (
     ENERGY_BALANCE,
     INDENTATION,
@@ -70,6 +72,9 @@ RATIOS = np.concatenate([np.arange(0.3, 1.0, 0.05), np.arange(1.0, 5.2, 0.25)])
 # the next ones until they agree.
 COMPARED = (1.0, SPANS["energy"][1], 2.5)
 
+# Largest difference of a peak force in natural modes, relative to the exact response.
+MODAL = 0.01
+
 Lengthened = TypeVar("Lengthened", ImpulseResponse, BendingModes)
 
 
@@ -96,7 +101,6 @@ class PagePlate(ABC):
     search: ClassVar[tuple[int, float]]  # velocities that a search tries first, and their span
     unjudged: ClassVar[str]
     price: ClassVar[str] = ""  # what takes long
-    node_mass = 0.0
 
     def __init__(self, problem: Problem, impacts: Impacts) -> None:
         self._problem, self._impacts = problem, impacts
@@ -109,6 +113,18 @@ class PagePlate(ABC):
     def resolved(self) -> dict[str, float] | None:
         """What the largest time step of an impact follows from; None if all have the same."""
         return None
+
+    @staticmethod
+    def check_places(problem: Problem) -> None:
+        """Raise ExploreError if the impact can't be moved."""
+        raise ExploreError("the modes of a plate with NONL are those of one place: leave out modes")
+
+    def places(self, modes: int) -> dict[str, Any]:
+        """Return the places of the impact, and the response at each in some modes.
+
+        Raises ExploreError if the modes are too few.
+        """
+        raise NotImplementedError
 
     @abstractmethod
     def bounds(self, own: Result | None) -> Iterator[dict[str, Any]]:
@@ -128,16 +144,61 @@ class LinearPlate(PagePlate):
 
     def __init__(self, problem: Problem, impacts: Impacts) -> None:
         super().__init__(problem, impacts)
-        self._response = _long_enough(ImpulseResponse(problem), problem, impacts).response
-        self.node_mass = self._response.node_mass
+        self._backend = _long_enough(ImpulseResponse(problem), problem, impacts)
 
     def sizes(self) -> Iterator[StepSize]:
         """Yield the impacts with the response."""
-        response = self._response
+        response = self._backend.response
         swept = _swept(self._impacts, response.dt, response.steps)
         rigid = response.mobility * response.dt**2
         structure = sweep_structure(response.response, rigid, swept)
         yield StepSize(response.dt, response.steps, [structure])
+
+    @staticmethod
+    def check_places(problem: Problem) -> None:
+        """Raise ExploreError if the impact can't be moved."""
+        if problem.symmetry.lines:
+            raise ExploreError("the deck has a part of a symmetric plate, on which an impact stays")
+        if problem.static is None:
+            raise ExploreError("the plate is not held, and modes give its bending alone")
+
+    def places(self, modes: int) -> dict[str, Any]:
+        """Return the places, whose responses are compared with the exact one at the deck's."""
+        plate, exact = ModalPlate(self._problem, modes), self._backend
+        own, response, modal = plate.own, exact.response, replace(exact)
+        modal.response = response._replace(
+            response=plate.response(own, response.dt, response.steps)
+        )
+        peaks, wanted = (
+            one.outcomes(self._impacts, judged=False).columns[About.REACHED]
+            for one in (modal, exact)
+        )
+        difference = float(peaks[0] / wanted[0] - 1.0)
+        if not abs(difference) <= MODAL:
+            raise ExploreError(
+                f"the peak force in {modes} modes differs from that of the exact response by "
+                f"{difference:+.1%}, and a page allows {MODAL:.0%}: take more modes"
+            )
+        places = [*plate.places()]
+        table = [[*place.deflection, *place.stiffness] for place in (*places, own)]
+        return {
+            "stiffness": encoded(plate.stiffness),
+            "damping": self._problem.damping,
+            "own": [own.x, own.y],
+            "at": [[place.x, place.y] for place in places],
+            "table": encoded(np.array(table), "<f4"),  # the last row is the deck's place
+            **picture(self._problem),
+            "bound": {
+                "quantity": "peak by modes",
+                "of": "modal",
+                "most": MODAL,
+                "level": TrustLevel.DOUBTFUL,
+                "words": f"difference of {len(plate.stiffness)} modes from the exact response, for "
+                "this impact at the deck's place; the commands have the exact response",
+                "unit": "percent",
+                "scale": 0.01,
+            },
+        }
 
     def bounds(self, own: Result | None) -> Iterator[dict[str, Any]]:
         """Yield the limit of the deflection, with the error of the force beyond it."""
@@ -242,14 +303,19 @@ KINDS: Mapping[str, type[PagePlate]] = {"": LinearPlate, "NONL": StretchingPlate
 
 
 def page_plates(
-    kind: type[PagePlate], settings: Settings, cases: Sequence[Case], own: Result
+    kind: type[PagePlate], settings: Settings, cases: Sequence[Case], own: Result, modes: int
 ) -> Iterator[dict[str, Any]]:
-    """Yield the plate of each case as a mapping for JSON; `own` is the run of the deck."""
+    """Yield the plate of each case as a mapping for JSON; `own` is the run of the deck.
+
+    The impact can be moved with natural modes, if there are any.
+    """
     for case in cases:
         problem = with_clock(apply_case(settings.deck, case), settings.clock, case)
         (impacts, faults) = impacts_of(problem, [0], [{}])
         if impacts is None:
             raise CasesError(faults[0])
+        if modes:
+            kind.check_places(problem)
         plate = kind(problem, impacts)
         sizes, arrays = [*plate.sizes()], dict[str, int]()
         yield {
@@ -262,7 +328,7 @@ def page_plates(
             "resolved": plate.resolved,
             "duration": sizes[0].dt * sizes[0].steps,
             "program": duration_of(problem),
-            "nodeMass": plate.node_mass,
+            "places": plate.places(modes) if modes else None,
             "mobility": problem.judge.mobility,
             "mass": problem.judge.plate_mass,
             "thickness": problem.judge.thickness,
@@ -354,9 +420,9 @@ def _encoded(structure: Structure, arrays: dict[str, int]) -> list[list[Any]]:
     ]
 
 
-def encoded(values: Floats) -> str:
-    """Return the doubles of an array, in C order, as base64."""
-    return base64.b64encode(np.ascontiguousarray(values, dtype="<f8").tobytes()).decode("ascii")
+def encoded(values: Floats, kind: str = "<f8") -> str:
+    """Return the numbers of an array, in C order, as base64."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
 
 
 def _strike(problem: Problem, impacts: Impacts) -> dict[str, Any]:

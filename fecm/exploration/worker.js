@@ -41,6 +41,9 @@ class Kernel {
                found: this.put(new Float64Array(data.found.length * LANES)),
                force: this.put(new Float64Array(plate.sizes.at(-1).steps * LANES))};
     const own = {...this.at, stride: LANES}, arrays = plate.arrays.map(text => this.put(bytes(text)));
+    const [, , , response] = plate.sizes[0].structures[0].find(([name]) => name === "plate");
+    this.response = arrays[response];
+    this.responses = new Map([[null, new Float64Array(bytes(plate.arrays[response]).buffer)]]);
     this.structures = new Map(plate.sizes.map(size => [size, size.structures.map(fields => {
       const view = new DataView(new ArrayBuffer(512));
       for (const [name, kind, offset, value] of fields)
@@ -49,6 +52,19 @@ class Kernel {
         else view.setBigInt64(offset, BigInt(own[name] ?? value), true);
       return this.put(view);
     })]));
+    this.place = undefined;
+    this.move(null);
+  }
+
+  /** Move the impact to a place of the table, or to the deck's, whose response is exact: null. */
+  move(place) {
+    if (this.place === place) return;
+    if (this.responses.size > 9) this.responses = new Map([[null, this.responses.get(null)]]);
+    if (!this.responses.has(place)) this.responses.set(place, modal(this.plate, place));
+    const response = this.responses.get(place);
+    this.doubles(this.response, response.length).set(response);
+    this.nodeMass = response.length ? this.plate.sizes[0].dt ** 2 / response[0] : 0;
+    this.place = place;
   }
 
   doubles(at, count) { return new Float64Array(this.exports.memory.buffer, at, count); }
@@ -65,7 +81,7 @@ class Kernel {
     for (const [name, , offset] of size.structures[0]) if (name in sizes) view.setBigInt64(offset, BigInt(sizes[name]), true);
     if (!this.exports[plate.function](...structures)) throw new Error("there is not enough memory");
     const force = this.doubles(this.at.force, steps * impacts.length), found = this.doubles(this.at.found, data.found.length * LANES);
-    return impacts.map((impact, lane) => summary(plate, size.dt, impact, force.subarray(lane * steps, (lane + 1) * steps),
+    return impacts.map((impact, lane) => summary(this, size.dt, impact, force.subarray(lane * steps, (lane + 1) * steps),
       Object.fromEntries(data.found.map((name, row) => [name, found[row * LANES + lane]]))));
   }
 
@@ -98,13 +114,31 @@ function sizeOf({resolved, strike, sizes}, {velocity, mass, k}) {
   return sizes.find(({dt}) => dt <= largest) ?? sizes.at(-1);
 }
 
+/** Response to a unit force at a place, summed from modes and the place's own vectors: fecm/exploration/places.py. */
+function modal({places, sizes: [{dt, steps}]}, place) {
+  const modes = new Float64Array(bytes(places.stiffness).buffer), table = new Float32Array(bytes(places.table).buffer);
+  const width = table.length / (places.at.length + 1), count = (width + modes.length) / 2; // vectors
+  const row = table.subarray(place * width, (place + 1) * width), b = 0.5 * places.damping * dt, keep = (1 - b) / (1 + b);
+  const response = new Float64Array(steps);
+  for (let vector = 0; vector < count; vector++) {
+    const share = dt * dt / (1 + b), stiffness = share * (modes[vector] ?? row[count + vector - modes.length]);
+    let step = share * row[vector] ** 2, w = step;
+    for (let n = 0; n < steps; n++) {
+      response[n] += w;
+      step = keep * step - stiffness * w;
+      w += step;
+    }
+  }
+  return response;
+}
+
 // Numbers of an impact ------------------------------------------------------------------------------------------
 
 const energyOf = (plate, {mass, velocity}) => 0.5 * plate.strike.factor * mass * velocity ** 2;
 const isDecided = result => result.over && !isNaN(result.max_deflection);
 
 /** What fecm/results/metrics.py takes from the forces of a case; NaN where its end has not decided a value. */
-function summary(plate, dt, impact, force, found) {
+function summary({plate, nodeMass}, dt, impact, force, found) {
   const {mass, velocity} = impact, {factor} = plate.strike, steps = force.length, end = steps * dt;
   let impulse = 0, lever = 0, peak = 0, peakAt = 0, touching = 0, contacts = 0, lastAt = -1, begin = 0;
   for (let n = 0; n < steps; n++) {
@@ -128,7 +162,7 @@ function summary(plate, dt, impact, force, found) {
   const where = (mask, value) => mask ? value : NaN;
   const limit = plate.threshold ? plate.threshold.force * Math.sqrt(impact.giic / plate.threshold.toughness) : NaN;
   const settled = over && (!held || reach <= data.ends.rules.RINGING * found.HIGHEST);
-  const lost = found.LOST + plate.nodeMass * found.LARGEST_DDW ** 2 / (8 * dt * dt);
+  const lost = found.LOST + nodeMass * found.LARGEST_DDW ** 2 / (8 * dt * dt);
   return {
     impact, force, dt, end: state, over, reached: factor * peak, limit, contactEnd: (lastAt + 1) * dt,
     energy: energyOf(plate, impact), overThreshold: factor * peak / limit, unconverged: found.UNCONVERGED || NaN,
@@ -167,12 +201,18 @@ function* kept(name, key, compute) {
 }
 
 /** Answer a message: each yield is a moment for the next one. */
-function* work({number, plate: row, impact, scatter}) {
+function* work({number, plate: row, place, impact, scatter}) {
   const plate = data.plates[row], say = parts => postMessage({number, ...parts}), {mass, k, giic} = impact;
   if (kernel.plate !== plate) kernel.load(plate);
-  const now = kernel.one(impact), time = kernel.enough;
+  kernel.move(place);
+  const now = {...kernel.one(impact), place}, time = kernel.enough, where = [row, place];
   say({now, plate: row});
   yield;
+  say({modal: place === null ? NaN : yield* kept("modal", [row, mass, k, impact.velocity], function* () {
+    const [exact, modes] = [null, plate.places.at.length].map(own => { kernel.move(own); return kernel.one(impact).reached; });
+    kernel.move(place);
+    return Math.abs(modes / exact - 1);
+  })});
   const energy = velocity => energyOf(plate, {mass, velocity}), speed = value => Math.sqrt(2 * value / plate.strike.factor / mass);
   const many = function* (impacts) {
     const results = [], steps = impacts.map(one => sizeOf(plate, one));
@@ -187,10 +227,10 @@ function* work({number, plate: row, impact, scatter}) {
     return results;
   };
   const reached = limit => () => searched(impact, plate, limit, many);
-  const found = now.limit > 0 ? energy(yield* kept("found", [row, mass, k, giic], reached(now.limit))) : null;
+  const found = now.limit > 0 ? energy(yield* kept("found", [where, mass, k, giic], reached(now.limit))) : null;
   say({found});
   const widest = Math.max(data.spans.energy[1] * energyOf(plate, plate.strike), now.energy);
-  say({curve: yield* kept("curve", [row, mass, k, giic, widest], function* () {
+  say({curve: yield* kept("curve", [where, mass, k, giic, widest], function* () {
     const most = 1.04 * Math.max(widest, found < 4 * widest ? 1.3 * found : 0);
     const energies = Array.from({length: CURVE}, (_, n) => most * (n + 1) / CURVE);
     const peaks = yield* many(energies.map(value => ({...impact, velocity: speed(value)})));
@@ -200,7 +240,7 @@ function* work({number, plate: row, impact, scatter}) {
   if (found && scatter.giic)
     for (const [name, sign] of [["5 %", -1], ["95 %", 1]]) { // the threshold goes with the root of G_IIc
       const limit = now.limit * Math.exp(0.5 * sign * NORMAL95 * 0.01 * scatter.giic);
-      range.push([name, energy(yield* kept(name, [row, mass, k, limit], reached(limit)))]);
+      range.push([name, energy(yield* kept(name, [where, mass, k, limit], reached(limit)))]);
     }
   const draws = now.limit > 0 && Object.values(scatter).some(size => size > 0) ? yield* drawn(impact, plate, scatter, many) : null;
   // The page goes on for longer than the program of the deck, where the impact does.
@@ -267,7 +307,7 @@ onmessage = ({data: message}) => {
   if (message.kernel) {
     ({data} = message);
     kernel = new Kernel(new WebAssembly.Module(bytes(message.kernel)));
-    postMessage({pins: message.pins.map(({plate, impact}) => { kernel.load(data.plates[plate]); return kernel.one(impact); })});
+    postMessage({pins: message.pins.map(({plate, place, impact}) => { kernel.load(data.plates[plate]); kernel.move(place); return kernel.one(impact); })});
   } else { job = work(message); next(); }
 };
 turns.port1.onmessage = slice;

@@ -515,7 +515,7 @@ def bending_vectors(plate: PlateModel, contact: Floats, count: int) -> list[Floa
     except SingularStiffnessError as error:
         raise ReductionError(f"a reduced model needs a plate that is held: {error}") from None
     mass = _independent_mass(plate, reduction, _bending_mass(plate))
-    vectors = [static, *_lanczos(tangent, mass, static, count)]
+    vectors = [static, *lanczos(tangent, mass, static, count)]
     return [reduction.field(vector)[free] for vector in vectors]
 
 
@@ -542,13 +542,13 @@ def _membrane_vectors(
     """Return Ritz vectors of the membrane under a load, in its independent dofs."""
     mass = _independent_mass(plane, reduction, plane.mass)
     rigid = rigid_in_plane(plane, reduction)
-    vectors = _lanczos(tangent, mass, tangent.solve(pull), MEMBRANE_VECTORS, rigid)
+    vectors = lanczos(tangent, mass, tangent.solve(pull), MEMBRANE_VECTORS, rigid)
     stiffness = reduction.reduced(plane.stiffness, plane.mesh.equations > 0)
     moved = ritz_vectors(stiffness, mass, pull, vectors)
     return moved.select(np.flatnonzero(moved.shares > MEMBRANE_SHARE * moved.shares.sum()))
 
 
-def _lanczos(
+def lanczos(
     tangent: Tangent, mass: Floats, static: Floats, count: int, rigid: Floats | None = None
 ) -> Floats:
     """Return up to `count` Lanczos vectors, (size, neq), from a static displacement (neq,).

@@ -322,6 +322,15 @@ def _check_values_of_impact(checked: Problem, findings: Findings) -> None:
         apply(patch.VALUES, findings, checked, segment)
 
 
+def check_place(checked: Problem, findings: Findings) -> None:
+    """Check the place of the impact alone."""
+    apply_first(impact.OF_DOF, findings, checked)
+    if checked.deck.has(model.Patch):
+        apply_first(patch.OF_PATCH, findings, checked)
+    if not findings.error_count:
+        apply((*impact.NEIGHBOURS, *impact.VALUES, *impact.OF_MESH), findings, checked)
+
+
 def check_listing(checked: Problem, findings: Findings) -> None:
     """Refuse what the printed program can't compute."""
     apply(listing_mode.OF_LISTING, findings, checked)
