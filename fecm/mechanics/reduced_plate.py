@@ -541,7 +541,8 @@ def _membrane_vectors(
 ) -> RitzVectors:
     """Return Ritz vectors of the membrane under a load, in its independent dofs."""
     mass = _independent_mass(plane, reduction, plane.mass)
-    rigid = rigid_in_plane(plane, reduction)
+    rigid, roots = rigid_in_plane(plane, reduction), np.sqrt(mass)
+    rigid = np.linalg.qr((rigid * roots).T)[0].T / roots
     vectors = lanczos(tangent, mass, tangent.solve(pull), MEMBRANE_VECTORS, rigid)
     stiffness = reduction.reduced(plane.stiffness, plane.mesh.equations > 0)
     moved = ritz_vectors(stiffness, mass, pull, vectors)
@@ -549,19 +550,17 @@ def _membrane_vectors(
 
 
 def lanczos(
-    tangent: Tangent, mass: Floats, static: Floats, count: int, rigid: Floats | None = None
+    tangent: Tangent, mass: Floats, static: Floats, count: int, fixed: Floats | None = None
 ) -> Floats:
     """Return up to `count` Lanczos vectors, (size, neq), from a static displacement (neq,).
 
-    Vectors are those of the tangent's independent dofs.  `rigid` (motions, neq) are motions without
-    strain, on which the load does no work.  The iteration is that with K^-1 M (B. Nour-Omid and
-    R. W. Clough, Earthquake Engineering & Structural Dynamics 12, 1984, 565).  Products of a matrix
-    and a vector are sums by einsum: BLAS would wake threads for each.
+    Vectors are those of the tangent's independent dofs.  They are orthogonal to `fixed`, (n, neq),
+    which are orthonormal: modes, or motions without strain on which the load does no work.  The
+    iteration is that with K^-1 M (B. Nour-Omid and R. W. Clough, Earthquake Engineering &
+    Structural Dynamics 12, 1984, 565).  Products of a matrix and a vector are sums by einsum: BLAS
+    would wake threads for each.
     """
-    roots = np.sqrt(mass)
-    fixed = np.empty((0, len(mass)))
-    if rigid is not None:
-        fixed = np.linalg.qr((rigid * roots).T)[0].T / roots
+    fixed = np.empty((0, len(mass))) if fixed is None else fixed
     start = len(fixed)
     end = min(start + count, int(np.count_nonzero(mass)))
     basis = np.concatenate([fixed, np.empty((end - start, len(mass)))])
