@@ -17,7 +17,13 @@ from fecm._errors import StudyError
 from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_names
 from fecm.identification import confirmation
-from fecm.identification.fitting import FittedPoints, ForceModel, Scaling, fit_parameters
+from fecm.identification.fitting import (
+    FittedPoints,
+    ForceModel,
+    Scaling,
+    covariance,
+    fit_parameters,
+)
 from fecm.identification.identify import IdentificationJob
 from fecm.identification.plates import ExactPlate, ForceExpansion
 from fecm.identification.result import Identification
@@ -137,6 +143,19 @@ def test_values_of_a_plate_that_stretches_are_those_of_a_fit_by_full_runs_alone(
     for name, true in zip(FREE, (K, VELOCITY), strict=True):
         assert abs(fit.values[name] - true) < 2.5 * fit.errors[name]
     assert fit.share == pytest.approx(0.02, rel=0.2)
+
+
+def test_standard_errors_are_those_of_a_fit_by_full_runs_alone_within_a_quarter() -> None:
+    fit, points = fit_of(0), by_full_runs(0)
+    deviation = np.sqrt(np.diagonal(covariance(points))) * points.scaling.slopes(points.x)
+    assert list(fit.errors.values()) == pytest.approx(deviation.tolist(), rel=0.25)
+
+
+def test_values_settle_after_few_fits_to_forces_near_full_runs() -> None:
+    run = fit_of(0).full_run
+    assert run is not None
+    assert run.is_settled
+    assert run.fits <= 3
 
 
 @pytest.mark.long

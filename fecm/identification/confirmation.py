@@ -1,22 +1,19 @@
-"""Full runs beside a fit by the reduced model: they correct its forces and confirm the values.
+"""Full runs beside a fit by the reduced model: they give its forces and confirm the values.
 
-The run of the deck corrects the reduced model for the first fit. At the fitted values full runs
-give the force and its derivatives, which take the place of the model: the parameters are fitted
-again to a force that is linear in the values of the impact (Gauss-Newton iteration), until the
-values settle. So the values and their standard errors are those of full runs, and the last full run
-has the values of the fitted deck.
+The first fit takes the forces of the reduced model. A full run at the fitted values then gives the
+force, and the reduced model its derivatives at the first values: the parameters are fitted again to
+a force that is linear in them. This is repeated with the next full run (Newton iteration with a
+fixed derivative), until the values settle. So the fitted force is that of a full run.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from fecm._typing import Floats
 from fecm.identification.fitting import (
     OF_RECORD,
     OFFSET,
@@ -24,17 +21,14 @@ from fecm.identification.fitting import (
     ForceModel,
     fitted,
 )
-from fecm.identification.plates import ForceExpansion, force_after
+from fecm.identification.plates import ForceExpansion
 from fecm.judge.fits import UNCONFIRMED, UNSETTLED
 from fecm.sweeps.impact_columns import impacts_from_cards
-from fecm.sweeps.outcome import About, Outcome
+from fecm.sweeps.outcome import Outcome
 
 # Effect of a full run on the values, in standard errors, and its difference from the fitted force,
 # over the peak, below which the values are settled.
 SETTLED, SAME = 0.1, 1e-4
-# Change of a scaled parameter for the derivative of full runs.
-BESIDE = 2e-3
-FALLS = 0.5  # effect of a full run, over that of the run before, above which a step is halved
 MOST_FITS = 6  # to forces near full runs
 
 
@@ -103,18 +97,6 @@ class Confirmed(NamedTuple):
         return not (self.model.plate.is_exact or bool(self.outcome.fine[0]))
 
 
-def beside_full_run(model: ForceModel) -> ForceModel:
-    """Return a model that fits the run of the deck, if that needs one and does not fail."""
-    if model.plate.is_exact:
-        return model
-    impact = fitted(model.deck, {})
-    outcome = model.outcome([impact], judged=True)
-    if not outcome.fine[0]:
-        return model
-    plate = model.plate.following(impacts_from_cards({0: impact}), outcome)
-    return model._replace(plate=plate)
-
-
 def confirmed(
     model: ForceModel,
     points: FittedPoints,
@@ -124,56 +106,39 @@ def confirmed(
 
     `fit_again` fits the parameters of a corrected model, from the values of a fit.
     """
-    fits, effect, is_halved = 0, math.inf, False
+    fits, expansion = 0, None
     while True:
         outcome = model.outcome([fitted(model.deck, points.values)], judged=True)
         if model.plate.is_exact or not outcome.fine[0]:
             return Confirmed(model, points, outcome)
         full_run = _compared(model, points, outcome, fits)
-        if fits == MOST_FITS or (fits and full_run.is_settled and not is_halved):
+        if fits == MOST_FITS or full_run.is_settled:
             return Confirmed(model, points, outcome, full_run)
-        corrected = model._replace(plate=model.plate.near(_expansion(model, points, outcome)))
+        expansion = (expansion or _expansion(model, points)).about(points.values, outcome)
+        corrected = model._replace(plate=model.plate.near(expansion))
         again = fit_again(corrected, points)
         if again is None:
             return Confirmed(model, points, outcome, full_run)
-        # Steps to and fro have the values between them.
-        is_halved = full_run.effect > FALLS * effect and fits + 1 < MOST_FITS
-        if is_halved:
-            again = _halfway(corrected, points, again)
-        model, points, fits, effect = corrected, again, fits + 1, full_run.effect
+        model, points, fits = corrected, again, fits + 1
 
 
-def _halfway(model: ForceModel, before: FittedPoints, after: FittedPoints) -> FittedPoints:
-    """Return the values half-way between those of two fits, and their force."""
-    middle = replace(after, x=(before.x + after.x) / 2.0)
-    return replace(middle, model=model.at(middle.time, [middle.values])[:, 0])
-
-
-def _expansion(model: ForceModel, points: FittedPoints, run: Outcome) -> ForceExpansion:
-    """Return the expansion about a full run, by full runs beside it.
-
-    A derivative is left out, as 0, where a run fails.
-    """
-    times, _ = model.plate.forces(impacts_from_cards({0: fitted(model.deck, {})}), [points.values])
-    dt = float(run.columns[About.DT][0])
-    times = dt * np.arange(math.ceil(times[-1] / dt) + 1.0)
-    force, slopes = _force_at(times, run), {}
-    for number, name in enumerate(points.scaling.start):
-        if name in OF_RECORD:
-            continue
-        x = points.x.copy()
-        x[number] += BESIDE if x[number] + BESIDE < points.scaling.high[number] else -BESIDE
-        values = points.scaling.values(x)
-        beside = model.outcome([fitted(model.deck, values)], judged=True)
-        if beside.fine[0]:
-            change = values[name] - points.values[name]
-            slopes[name] = (_force_at(times, beside) - force) / change
-    return ForceExpansion(times, force, points.values, slopes)
-
-
-def _force_at(times: Floats, run: Outcome) -> Floats:
-    """Return the force of a run, which is 0 after its end."""
-    return np.asarray(np.interp(times, *force_after(run), right=0.0))
+def _expansion(model: ForceModel, points: FittedPoints) -> ForceExpansion:
+    """Return the expansion of the forces of a model about the values of a fit."""
+    scaling, trials = points.scaling, [points.values]
+    names = [name for name in scaling.start if name not in OF_RECORD]
+    for row, name in enumerate(scaling.start):
+        if name in names:
+            step = model.plate.step * np.eye(len(points.x))[row]
+            for x in (points.x + step, points.x - step):
+                trials.append(scaling.values(np.clip(x, scaling.low, scaling.high)))
+    impacts = impacts_from_cards(dict(enumerate(fitted(model.deck, trial) for trial in trials)))
+    times, forces = model.plate.forces(impacts, trials)
+    model.computed(len(trials))
+    slopes = {}
+    for row, name in zip(range(1, len(trials), 2), names, strict=True):
+        change = trials[row][name] - trials[row + 1][name]
+        slopes[name] = (forces[:, row] - forces[:, row + 1]) / change
+    return ForceExpansion(times, forces[:, 0], points.values, slopes)
 
 
 def _deviation(points: FittedPoints) -> float:

@@ -20,7 +20,7 @@ from fecm.authoring.strike_values import lacks_value
 from fecm.deck.model import Deck, Impact, Indentation, Projectile
 from fecm.deck.units import unit_names
 from fecm.identification.alignment import IdentifyError, check_measured, lags
-from fecm.identification.confirmation import Confirmed, beside_full_run, confirmed
+from fecm.identification.confirmation import Confirmed, confirmed
 from fecm.identification.fitting import (
     DELAY,
     FIRST_EVALUATIONS,
@@ -95,8 +95,8 @@ class IdentificationJob:
     :attr:`Identification.plate_errors` has two of them.
 
     The first fit of a plate that stretches (NONL) takes the forces of the reduced model of sweeps.
-    Force and derivatives of full runs at the fitted values then take their place, until the values
-    settle. The last full run confirms them (:attr:`Identification.full_run`).
+    A full run at the fitted values then gives the force, and the model its derivatives, until the
+    values settle. The last full run confirms them (:attr:`Identification.full_run`).
 
     Parameters
     ----------
@@ -190,8 +190,7 @@ class IdentificationJob:
         model.histories([{}] * (len(self._free) + 1))
         each = time.perf_counter() - first
         memory = needed_bytes(self.problem, in_memory=False)
-        impact = len({*self._free} - {*OF_RECORD})
-        seconds = first - begin + USUAL_EVALUATIONS * each + model.plate.seconds_of_runs(impact)
+        seconds = first - begin + USUAL_EVALUATIONS * each + model.plate.seconds_of_runs
         return Price(self.problem.work.steps, 0, memory, seconds)
 
     def execute(self, watch: Watch = SILENT) -> Identification:
@@ -322,7 +321,6 @@ def fit_deck(
     sizes = {DELAY: width, OFFSET: UNIT_OFFSET * float(force.max()), "alpha_p": depth}
     first = min(0.0, float(measured.time[0]), *starts)
     model = model.covering(float(measured.time[-1]) - first + width)
-    model = beside_full_run(model)
 
     def fit_from_starts(names: Sequence[str], trial_model: ForceModel) -> FittedPoints | None:
         """Return the best fit from all starts of the delay; None if the deck's run is too short."""

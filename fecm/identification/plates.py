@@ -24,16 +24,15 @@ from fecm.sweeps.in_full import motion
 from fecm.sweeps.outcome import About, Backend, Outcome
 from fecm.sweeps.reduced import MODES
 
-USUAL_RUNS = 5  # of the deck and of fitted decks, and those of the errors of the plate
-NO_DIFFERENCE = (np.zeros(1), np.zeros(1))
+USUAL_RUNS = 5  # of fitted decks, and those of the errors of the plate
 
 
 class ForceExpansion(NamedTuple):
-    """Force of a full run, and its derivatives with respect to the values of the impact."""
+    """Force of an impact, and its derivatives with respect to the values of the impact."""
 
     times: Floats  # from 0 on
     force: Floats  # (times,)
-    place: Mapping[str, float]  # values of the run
+    place: Mapping[str, float]  # values of the impact
     slopes: Mapping[str, Floats]  # derivatives by name, (times,) each
 
     def at(self, trials: Sequence[Mapping[str, float]]) -> Floats:
@@ -46,6 +45,11 @@ class ForceExpansion(NamedTuple):
             columns.append(force)
         return np.stack(columns, axis=1)
 
+    def about(self, values: Mapping[str, float], run: Outcome) -> Self:
+        """Return the expansion with the force of a run with these values, and these derivatives."""
+        force = np.interp(self.times, *force_after(run), right=0.0)
+        return self._replace(force=force, place=values)
+
 
 @dataclass(frozen=True)
 class ExactPlate:
@@ -54,6 +58,8 @@ class ExactPlate:
     problem: Problem
     backend: Backend
     is_exact: ClassVar[bool] = True
+    step: ClassVar[float] = 1e-3  # half that of central differences in the scaled parameters
+    settled: ClassVar[float] = 1e-7  # step of a fit, relative to the scaled parameters, at its end
 
     @property
     def modes(self) -> int:
@@ -82,25 +88,22 @@ class ExactPlate:
         force = np.vstack([np.zeros(len(impacts)), outcome.force.T])
         return dt * np.arange(float(len(force))), force
 
-    def following(self, impact: Impacts, run: Outcome) -> Self:
-        """Return the plate that has the force of the full run of an impact."""
-        return self
-
     def near(self, expansion: ForceExpansion) -> ExpandedPlate:
         """Return the plate with forces of full runs near one."""
         return ExpandedPlate(self.problem, self.backend, self, expansion)
 
     @property
     def alone(self) -> ExactPlate:
-        """The plate without the full runs that it follows."""
+        """The plate without a full run that gives its forces."""
         return self
 
     def like(self, deck: Deck) -> ExactPlate:
         """Return the plate of another deck, in runs as long as here."""
         return plate_of_fit(deck)
 
-    def seconds_of_runs(self, parameters: int) -> float:
-        """Return the seconds of the full runs of a fit of some parameters."""
+    @property
+    def seconds_of_runs(self) -> float:
+        """Seconds of the full runs of a fit."""
         return 0.0
 
 
@@ -110,8 +113,11 @@ class ModalPlate(ExactPlate):
 
     backend: BendingModes
     share: float = 1.0  # duration of the runs, over that of the program
-    difference: tuple[Floats, Floats] = NO_DIFFERENCE  # times, and force added to the trial forces
     is_exact: ClassVar[bool] = False
+    # The force has fast vibrations, of some .1 % of the peak, which full runs don't have.  Their
+    # phase changes as soon as k changes by .1 %.
+    step: ClassVar[float] = 0.05
+    settled: ClassVar[float] = 1e-2
 
     @property
     def modes(self) -> int:
@@ -131,45 +137,25 @@ class ModalPlate(ExactPlate):
     def _trials(self) -> BendingModes:
         return self.backend.lengthened(self.share)
 
-    def forces(
-        self, impacts: Impacts, values: Sequence[Mapping[str, float]]
-    ) -> tuple[Floats, Floats]:
-        """Return times from 0 on, and the forces of impacts, (times, impacts)."""
-        times, forces = super().forces(impacts, values)
-        return times, forces + np.interp(times, *self.difference)[:, None]
-
-    @property
-    def alone(self) -> ModalPlate:
-        """The plate without the full runs that it follows."""
-        return replace(self, difference=NO_DIFFERENCE)
-
     def covering(self, duration: float) -> Self:
         """Return the plate in runs of a duration; a program with OVER has steps for longer ones."""
         if not self.problem.work.at_most:
             return self
         return replace(self, share=min(1.0, duration / duration_of(self.problem)))
 
-    def following(self, impact: Impacts, run: Outcome) -> Self:
-        """Return the plate that has the force of the full run of an impact.
-
-        The difference of the run from the plate is added to all forces.
-        """
-        times, force = force_after(self.outcomes(impact, judged=False))
-        in_full = np.interp(times, *force_after(run), right=0.0)
-        return replace(self, difference=(times, in_full - force))
-
     def like(self, deck: Deck) -> ExactPlate:
         """Return the plate of another deck, in full runs as long as here."""
         problem = sole_problem(deck, warns=False)
         return ExactPlate(problem, FullRuns(problem).lengthened(self.share))
 
-    def seconds_of_runs(self, parameters: int) -> float:
-        """Return the seconds of the full runs of a fit of some parameters, from some steps."""
+    @property
+    def seconds_of_runs(self) -> float:
+        """Seconds of the full runs of a fit, from some steps."""
         before, step = seconds_of_steps(
             lambda observer: motion([self.problem], MemorySink(), (), observers=[observer])
         )
         steps = self.backend.durations[0] * self.problem.work.steps
-        return (USUAL_RUNS + parameters) * (before + step * steps)
+        return USUAL_RUNS * (before + step * steps)
 
 
 @dataclass(frozen=True)
@@ -201,7 +187,7 @@ class ExpandedPlate(ExactPlate):
 
     @property
     def alone(self) -> ExactPlate:
-        """The plate without the full runs that it follows."""
+        """The plate without a full run that gives its forces."""
         return self.plate.alone
 
     def like(self, deck: Deck) -> ExactPlate:
