@@ -21,6 +21,7 @@ import fecm
 from fecm.authoring.case import CasesError
 from fecm.exploration.explore import Exploration
 from fecm.exploration.page import page, script_json
+from fecm.problem.loading import load_one
 from tests.browser import Browser, find_browser
 from tests.calls import call
 from tests.decks import small
@@ -135,6 +136,14 @@ def test_a_stretching_plate_says_how_far_its_modes_are_from_full_runs() -> None:
     swept = fecm.sweep(STRETCHING, {"velocity": [600.0]}, model="reduced")
     difference = f"{swept['peak_force'][0] / full.peak_force - 1.0:+.1%}"
     assert re.findall(r"(\S+%) at", bound["words"])[0] == difference
+
+
+def test_a_page_says_of_a_deflection_what_a_run_says() -> None:
+    (plate,) = data_of(fecm.explore(HELD))["plates"]
+    beyond = next(bound["beyond"] for bound in plate["bounds"] if bound["of"] == "highest")
+    judge = load_one(HELD).judge
+    for ratio in (0.31, 0.533, 0.72, 1.9, 4.98, 7.0):
+        assert [text for least, text in beyond if least <= ratio][-1] == judge.softness(ratio)
 
 
 def test_the_command_says_that_a_stretching_plate_takes_full_runs(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ function judgements(plate, result) {
   const isMoved = result.place !== null, bounds = [...plate.bounds, ...(isMoved ? [plate.places.bound] : [])];
   const rows = bounds.filter(bound => !isNaN(result[bound.of])).map(bound => {
     const value = result[bound.of], size = value / (bound.scale ?? 1), isBeyond = value > bound.most;
-    const more = isBeyond && bound.beyond?.findLast(([at]) => at <= size + 0.025);
+    const more = isBeyond && bound.beyond?.findLast(([at]) => at <= size);
     return {quantity: bound.quantity, size: quantity(bound.unit ?? "none", size, 3), level: isBeyond ? bound.level : "within range",
             words: more ? `${bound.words}; ${more[1]}` : bound.words};
   });

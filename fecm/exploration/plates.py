@@ -67,7 +67,7 @@ SPANS = {
     "giic": (0.25, 4.0),
 }
 # Deflections over the thickness at which the error of a linear plate is put into words.
-RATIOS = np.concatenate([np.arange(0.3, 1.0, 0.05), np.arange(1.0, 5.2, 0.25)])
+RATIOS = np.arange(0.3, 5.2, 0.005)
 # Factors on the deck's energy at which a plate in modes is compared with full runs: its own, and
 # the next ones until they agree.
 COMPARED = (1.0, SPANS["energy"][1], 2.5)
@@ -203,11 +203,12 @@ class LinearPlate(PagePlate):
     def bounds(self, own: Result | None) -> Iterator[dict[str, Any]]:
         """Yield the limit of the deflection, with the error of the force beyond it."""
         judge = self._problem.judge
+        first = {judge.softness(ratio): round(float(ratio), 3) for ratio in RATIOS[::-1]}
         yield {
             **_bound(judge.deflection, "highest", float(judge.largest(judge.deflection))),
             "unit": "thickness",
             "scale": judge.thickness,
-            "beyond": [(round(float(ratio), 2), judge.softness(ratio)) for ratio in RATIOS],
+            "beyond": [(ratio, text) for text, ratio in reversed(first.items())],
         }
 
 
