@@ -22,7 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 import fecm
-from fecm.sweeps.reduced import MODES
+from fecm.sweeps.task import MODES
 
 COUPON = (
     *("--fixture", "D7136", "--material", "IM7/8552"),

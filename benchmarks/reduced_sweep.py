@@ -22,8 +22,9 @@ import numpy as np
 from fecm.authoring.strike_values import strike_of
 from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
 from fecm.problem.loading import load_deck
-from fecm.sweeps.reduced import MODES, reduced
+from fecm.sweeps.reduced import reduced
 from fecm.sweeps.responses import Hits
+from fecm.sweeps.task import MODES
 
 CASES, COMPARED, ROUNDS = 256, 16, 5
 COUPON = (

@@ -85,7 +85,7 @@ def test_cases_are_tasks_of_their_own_and_resume() -> None:
     assert [task.numbers for task in tasks(plan(problem, cases))] == [
         (0,), (1,), (2,), (3,), (4,)
     ]  # fmt: skip
-    searches = plan(problem, [{"k": 5e4}, {"k": 6e4}], until=50.0)
+    searches = plan(problem, [{"k": 5e4}, {"k": 6e4}], until=50.0, model="full")
     assert [task.numbers for task in tasks(searches)] == [(0,), (1,)]
     assert len(tasks(plan(problem_of(LINEAR), cases))) == 1
 
@@ -93,7 +93,7 @@ def test_cases_are_tasks_of_their_own_and_resume() -> None:
 def test_a_search_takes_few_runs_and_its_velocity_gives_the_same_run_again(
     runs: list[float],
 ) -> None:
-    swept = fecm.sweep(DECK, {"k": [6e4]}, until="threshold")
+    swept = fecm.sweep(DECK, {"k": [6e4]}, until="threshold", model="full")
     assert 3 <= len(runs) <= 6
     assert THRESHOLD <= swept["peak_force"][0] <= THRESHOLD * (1.0 + 2e-5)
     velocity = float(swept["found_velocity"][0])
@@ -107,7 +107,7 @@ def test_a_search_takes_few_runs_and_its_velocity_gives_the_same_run_again(
 def test_a_search_starts_at_the_quick_models_and_lengthens_runs_that_end_too_early(
     runs: list[float],
 ) -> None:
-    swept = fecm.sweep(DECK.replace("LOOP        600", "LOOP        120"), until=20.0)
+    swept = fecm.sweep(DECK.replace("LOOP        600", "LOOP        120"), until=20.0, model="full")
     assert np.isnan(runs[0])
     assert swept.steps[0] in (240, 480)
     assert swept["peak_force"][0] == pytest.approx(20.0, rel=2e-5)
@@ -125,7 +125,7 @@ def test_the_number_of_runs_and_their_time_are_told_first(tmp_path: Path) -> Non
     assert re.search(r"response: 3 cases, one full run each: about [\d.]+ s", done.stderr)
     assert "3 cases: 3 beyond the contact law" in done.stdout
     problem = problem_of(DECK)
-    searched = price.expected(problem, plan(problem, [{}], until=50.0), 0)
+    searched = price.expected(problem, plan(problem, [{}], until=50.0, model="full"), 0)
     assert "1 case, about 5 full runs each: about " in searched
     assert searched.endswith(" s of computation")
 
@@ -135,7 +135,9 @@ def test_the_expected_time_grows_with_the_work(monkeypatch: pytest.MonkeyPatch) 
     problem = problem_of(DECK)
 
     def expected_time(cases: list[dict[str, Any]], workers: int = 1, **more: Any) -> str:
-        return price.expected(problem, plan(problem, cases, **more), workers).split("about ")[-1]
+        return price.expected(problem, plan(problem, cases, model="full", **more), workers).split(
+            "about "
+        )[-1]
 
     assert expected_time([{"k": 5e4}]) == "7 s"
     assert expected_time([{"k": 5e4 + n} for n in range(6)], 2) == "21 s by 2 workers"
@@ -175,7 +177,8 @@ def test_refined_and_random_cases_are_full_runs_too(runs: list[float]) -> None:
     refined = fecm.sweep(short, refine=[1, 2])
     assert len(runs) == 2
     assert refined.completed.all()
-    drawn = fecm.sweep(short, random={"velocity": "uniform:300,600"}, samples=16)
+    random = {"velocity": "uniform:300,600"}
+    drawn = fecm.sweep(short, random=random, samples=16, model="full")
     assert len(runs) == 18
     assert drawn.random is not None
     assert drawn.completed.all()

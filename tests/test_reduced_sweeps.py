@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -21,11 +22,14 @@ from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
 from fecm.mechanics.reduced_plate import ReducedPlate
 from fecm.problem.loading import load_deck
 from fecm.results.metrics import RATIO
-from fecm.sweeps import execute
+from fecm.simulation.run import run_program
+from fecm.simulation.simulation import Simulation
+from fecm.sweeps import execute, in_full
+from fecm.sweeps.about import about_sweep
 from fecm.sweeps.impact_columns import impacts_from_cards
 from fecm.sweeps.methods import _plate
 from fecm.sweeps.plan import plan
-from fecm.sweeps.reduced import ReducedImpacts, ReducedModel, by_halvings, count_held, reduced
+from fecm.sweeps.reduced import MOST_MODES, ReducedImpacts, by_halvings, count_held, reduced
 from fecm.sweeps.responses import Hits
 from fecm.sweeps.task import Task, tasks
 from tests.builders import table
@@ -169,21 +173,111 @@ def test_too_few_modes_are_refused_before_the_sweep(monkeypatch: pytest.MonkeyPa
     assert [task.numbers for task in ran] == [(3,)] * 2 + [(0,)] * 2
 
 
-def test_cases_of_energies_at_which_the_model_does_not_hold_are_run_in_full(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def soft(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Reduce plates that are too soft, which matters where the contact is stiff."""
     right = reduced_plate.reduced_plate
 
-    def soft(*given: Any, **options: Any) -> ReducedPlate:
-        """Reduce a plate that is too soft, which matters where the contact is stiff."""
+    def reduce_softly(*given: Any, **options: Any) -> ReducedPlate:
         plate = right(*given, **options)
         shares = plate.deflection**2 / plate.stiffness
         return replace(plate, flexibility=SOFT * float(shares.sum()))
 
-    monkeypatch.setattr("fecm.sweeps.reduced.reduced_plate", soft)
+    monkeypatch.setattr("fecm.sweeps.reduced.reduced_plate", reduce_softly)
+    _plate.cache_clear()
+    yield
+    _plate.cache_clear()
+
+
+@pytest.fixture
+def full_runs(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Velocities of the full runs that are taken."""
+    taken: list[float] = []
+
+    def counted(simulation: Simulation) -> None:
+        taken.append(strike_of(simulation.problem.deck).velocity)
+        run_program(simulation)
+
+    monkeypatch.setattr(in_full, "run_program", counted)
+    return taken
+
+
+def test_a_model_that_agrees_with_full_runs_computes_a_sweep_by_itself(
+    full_runs: list[float],
+) -> None:
+    velocities = np.linspace(300.0, 900.0, 8).tolist()
+    swept = fecm.sweep(DECK, {"velocity": velocities})
+    assert sorted(full_runs) == [300.0, pytest.approx(4.5e3 / 7.0), 900.0]
+    assert swept.reduced is not None
+    assert (swept.reduced.limit, swept.reduced.in_full) == (0.01, 0)
+    full = fecm.sweep(DECK, {"velocity": velocities}, model="full")
+    assert full.reduced is None
+    np.testing.assert_allclose(swept["peak_force"], full["peak_force"], rtol=1e-2)
+    np.testing.assert_allclose(swept["impulse"], full["impulse"], rtol=1e-2)
+    about = about_sweep(swept)["reduced"]
+    assert about is not None
+    assert about["cases"] == [0, 4, 7]
+    assert np.abs(about["differences"]["peak_force"]).max() < 0.01
+    assert about_sweep(full)["reduced"] is None
+
+
+def test_a_model_that_disagrees_leaves_a_sweep_to_full_runs(
+    soft: None, full_runs: list[float]
+) -> None:
+    velocities = np.linspace(400.0, 900.0, 8).tolist()
+    with pytest.warns(fecm.FecmWarning) as caught:
+        swept = fecm.sweep(DECK, {"velocity": velocities})
+    assert swept.reduced is None
+    assert len(full_runs) == 2 + 8  # the largest energy and the smallest are tried
+    full = fecm.sweep(DECK, {"velocity": velocities}, model="full")
+    np.testing.assert_array_equal(swept["peak_force"], full["peak_force"])
+    notes = " ".join(str(warning.message) for warning in caught)
+    assert re.search(r"13 modes differs by -.*%.* at most 1% is allowed", notes)
+    assert re.search(r"8 cases, one full run each: about .* of computation", notes)
+
+
+def test_a_search_by_the_model_is_repeated_in_full_if_a_full_run_denies_it(
+    soft: None, tmp_path: Path
+) -> None:
+    (tmp_path / "d.inp").write_text(DECK)
+    given = ("sweep", "d.inp", "--find", "velocity", "--until", "peak_force=150")
+    done = call(*given, "-o", "s.h5", cwd=tmp_path)
+    assert done.exit_code == 0, done.stderr
+    assert "at most 1% is allowed" in done.stderr
+    full = call(*given, "--model", "full", "-o", "full.h5", cwd=tmp_path)
+    assert full.exit_code == 0, full.stderr
+    found, in_full = (
+        fecm.load_sweep(tmp_path / name)["found_velocity"] for name in ("s.h5", "full.h5")
+    )
+    np.testing.assert_array_equal(found, in_full)
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [
+        ({"vary": {"velocity": [300.0 + n for n in range(7)]}}, "SharedMotion"),
+        ({"vary": {"velocity": [300.0 + n for n in range(8)]}}, "ReducedOrFullRuns"),
+        # Eight plates, each with a reduction and cases enough for none of them.
+        ({"vary": {"thickness": [0.02 + n / 1000 for n in range(8)]}}, "SharedMotion"),
+        ({"vary": {"velocity": [300.0 + n for n in range(8)]}, "model": "full"}, "SharedMotion"),
+        ({"refine": [1, 2]}, "SharedMotion"),
+        ({"until": 50.0}, "ReducedOrFullRuns"),
+    ],
+)
+def test_the_model_is_tried_where_it_saves_half_of_the_full_runs(
+    given: dict[str, Any], name: str
+) -> None:
+    assert type(fecm.Sweep(DECK, **given).plan.method).__name__ == name
+
+
+@pytest.mark.usefixtures("soft")
+def test_cases_of_energies_at_which_the_model_does_not_hold_are_run_in_full(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "d.inp").write_text(DECK)
     given = ("sweep", "d.inp", "--vary", "velocity=50,100,200,300,400,600,900", "--history")
-    assert call(*given, "-o", "full.h5", cwd=tmp_path).exit_code == 0
+    full_sweep = call(*given, "--model", "full", "-o", "full.h5", cwd=tmp_path)
+    assert full_sweep.exit_code == 0
     done = call(*given, "--model", "reduced", "--modes", "2", "-o", "s.h5", cwd=tmp_path)
     assert done.exit_code == 0, done.stderr
     actual, full = (fecm.load_sweep(tmp_path / name) for name in ("s.h5", "full.h5"))
@@ -219,11 +313,9 @@ def test_a_model_that_fails_in_the_middle_is_not_taken_beyond_it() -> None:
     assert count_held(list(range(30)), lambda cases: {case for case in cases if case == 15}) == 15
 
 
-def test_a_model_with_all_its_modes_is_not_told_to_take_more() -> None:
-    row = {"case": np.array([4]), "peak_force": np.array([0.9]), RATIO: np.ones(1)}
-    full = {"full_peak_force": np.ones(1), f"full_{RATIO}": np.ones(1)}
+def test_a_model_with_all_its_modes_is_not_told_to_take_more(soft: None) -> None:
     with pytest.raises(CasesError, match="these are all its modes; take full runs"):
-        ReducedModel(40, {**row, **full}).check()
+        fecm.sweep(DECK, {"velocity": [900.0]}, model="reduced", modes=MOST_MODES)
 
 
 @pytest.mark.usefixtures("every_vector")

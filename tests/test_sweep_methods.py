@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.authoring.case import Case
 from fecm.deck.model import Indentation
 from fecm.deck.reader import ParsedProblem
 from fecm.problem import loading
@@ -45,8 +46,9 @@ def first_force(result: fecm.Result) -> dict[str, float]:
         (weak(), {"measure": "failure"}, "SharedMotion"),
         (weak(), {"until": {"exposure": 1.0}}, "SeparateRuns"),
         (DECK, {}, "SharedMotion"),
-        (DECK, {"until": 50.0}, "SeparateRuns"),
+        (DECK, {"until": 50.0}, "ReducedOrFullRuns"),
         (DECK, {"model": "reduced"}, "ReducedRuns"),
+        (DECK, {"model": "full", "until": 50.0}, "SeparateRuns"),
     ],
 )
 def test_deck_and_options_decide_the_method_of_a_sweep(
@@ -59,7 +61,7 @@ def test_deck_and_options_decide_the_method_of_a_sweep(
 class _Constant(Method):
     """A method whose cases all have a step of the plate, and fail with a word of its own."""
 
-    def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
+    def applies(self, checked: Problem, settings: Settings, cases: Sequence[Case]) -> bool:
         return True
 
     def refusal(self, checked: Problem, definition: Plan) -> str:

@@ -144,7 +144,7 @@ class Exploration:
             self._kind.check_places(problem)
             if moving := [name for name in cases[0] if name in names_of(Changes.PLACE)]:
                 raise ExploreError(f"{moving[0]} moves the impact, as a click does: leave it out")
-        self._plan = plan(problem, cases, modes=self._kind.modes)
+        self._plan = plan(problem, cases, model=self._kind.sweep_model)
         if not strike_of(problem.deck).velocity:
             raise ExploreError(
                 "the sliders start at the velocity of ROD, which must not be 0: give the deck one"

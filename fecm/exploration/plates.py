@@ -49,15 +49,8 @@ from fecm.sweeps.backends import BendingModes, ImpulseResponse
 from fecm.sweeps.impact_columns import Impacts, impacts_of
 from fecm.sweeps.limits import PEAK_FORCE
 from fecm.sweeps.outcome import About, Status
-from fecm.sweeps.reduced import (
-    LIMIT,
-    MODES,
-    PLATE_PHASE,
-    PROJECTILE_PHASE,
-    REDUCED,
-    by_halvings,
-)
-from fecm.sweeps.task import Settings
+from fecm.sweeps.reduced import LIMIT, PLATE_PHASE, PROJECTILE_PHASE, by_halvings
+from fecm.sweeps.task import MODES, REDUCED, Settings
 
 # Factors on the deck's values at the ends of the sliders.
 SPANS = {
@@ -93,7 +86,7 @@ class StepSize(NamedTuple):
 class PagePlate(ABC):
     """A plate of a page: how the kernel computes its impacts, and what bounds its model."""
 
-    modes: ClassVar[int | None] = None  # bending modes of the reduced model; None of full plates
+    sweep_model: ClassVar[str | None] = None  # of a sweep that computes the same; None of either
     model: ClassVar[str]
     options: ClassVar[str] = ""  # of a sweep that computes the same
     function: ClassVar[str]  # of the kernel
@@ -215,7 +208,7 @@ class LinearPlate(PagePlate):
 class StretchingPlate(PagePlate):
     """A plate that stretches as it bends, in some bending modes."""
 
-    modes = MODES
+    sweep_model = REDUCED
     model = f"Stretching plate in {MODES} bending modes"
     options = f"--model {REDUCED}"
     function = "fecm_reduced"

@@ -22,7 +22,7 @@ from fecm.sweeps.backends import BendingModes, FullRuns, ImpulseResponse, only_i
 from fecm.sweeps.impact_columns import Impacts
 from fecm.sweeps.in_full import motion
 from fecm.sweeps.outcome import About, Backend, Outcome
-from fecm.sweeps.reduced import MODES
+from fecm.sweeps.task import MODES
 
 USUAL_RUNS = 5  # of fitted decks, and those of the errors of the plate
 

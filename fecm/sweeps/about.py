@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Annotated, Any, TypedDict
 
 from fecm._typing import FiniteFloat
+from fecm.results.metrics import RATIO
+from fecm.sweeps.reduced import ReducedModel
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.statistics import Exceedance, Indices, RandomResult, Statistics
 from fecm.sweeps.summary import summary_of_sweep, sweep_verdict
@@ -26,6 +28,18 @@ class RandomJson(TypedDict):
     exceedance: Annotated[dict[str, Any], "Lists with an item for each limit."]
 
 
+class ReducedJson(TypedDict):
+    """Reduced model beside full runs in JSON."""
+
+    modes: int
+    limit: Annotated[float, "Largest relative difference that is allowed."]
+    in_full: Annotated[int, "Number of cases that were run in full, as the model differs more."]
+    cases: Annotated[list[int], "Cases that were also run in full."]
+    differences: Annotated[
+        CaseColumns, "Relative differences of the model from these full runs, by quantity."
+    ]
+
+
 class SweepJson(TypedDict):
     """Sweep in JSON."""
 
@@ -42,6 +56,7 @@ class SweepJson(TypedDict):
     convergence: Annotated[
         dict[str, Any], "Order, limit and band of a refinement study; empty for others."
     ]
+    reduced: Annotated[ReducedJson | None, "Null unless the reduced model computed cases."]
     random: Annotated[RandomJson | None, "Null for a sweep without random values."]
 
 
@@ -61,7 +76,20 @@ def about_sweep(result: SweepResult, path: object = None) -> SweepJson:
         "values": {name: values.tolist() for name, values in columns.items()},
         "results": {name: values.tolist() for name, values in result.summary.items()},
         "convergence": {name: vars(study) for name, study in result.convergence.items()},
+        "reduced": None if result.reduced is None else _about_reduced(result.reduced),
         "random": None if result.random is None else _about_random(result.random),
+    }
+
+
+def _about_reduced(model: ReducedModel) -> ReducedJson:
+    """Return how far the model is from full runs."""
+    names = ("peak_force", RATIO, *model.measured)
+    return {
+        "modes": model.modes,
+        "limit": model.limit,
+        "in_full": model.in_full,
+        "cases": model.columns["case"].tolist(),
+        "differences": {name: model.difference(name).tolist() for name in names},
     }
 
 

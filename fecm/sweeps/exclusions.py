@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from fecm._options import declared_options
 from fecm.authoring.case import CasesError
 from fecm.sweeps.search import Sought, search_of
-from fecm.sweeps.task import Measure
+from fecm.sweeps.task import REDUCED, Measure
 
 if TYPE_CHECKING:
     from fecm.sweeps.job import Sweep
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 FUNCTION = "a function as measure"
 FAILURE = "failure as measure"
 PEAK = "until of the peak force"
+REDUCED_MODEL = f"`model` {REDUCED}"
 SEVERAL = "several workers"
 
 
@@ -51,7 +52,7 @@ EXCLUSIONS = (
     Exclusion("until", ("full",), "run the velocity found: `vary` velocity=FOUND and `full` 0"),
     Exclusion(PEAK, (FAILURE,), "exposures need full runs, and this search takes none"),
     Exclusion(
-        "model",
+        REDUCED_MODEL,
         ("build", FUNCTION),
         "the reduced model is of one deck, and stores no result for a function",
     ),
@@ -62,7 +63,7 @@ OF_RANDOM = ("correlation", "samples", "seed", "design", "sensitivity", "exceed"
 NEEDS = (
     Need(OF_RANDOM, "random", "they describe random values"),
     Need(("random",), "samples", "a design has a number of samples"),
-    Need(("modes",), "model", "they are the modes of the reduced model"),
+    Need(("modes",), REDUCED_MODEL, "they are the modes of the reduced model"),
 )
 
 
@@ -113,6 +114,8 @@ def _given(job: Sweep) -> set[str]:
     search = search_of(job.until)
     if search is not None and search.quantity is Sought.PEAK_FORCE:
         names.add(PEAK)
+    if job.model == REDUCED:
+        names.add(REDUCED_MODEL)
     if (job.workers or 1) > 1:
         names.add(SEVERAL)
     return names

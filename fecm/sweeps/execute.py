@@ -383,19 +383,21 @@ def carry_out_plan(
     def run_tried(tried: Sequence[Task]) -> list[tuple[Task, Outcome]]:
         return run(tried, lambda task, outcome: None)
 
-    whole, model, computed = definition.method.prepared(definition, run_tried, watch)
+    whole, model, computed = definition.method.prepared(problem, definition, run_tried, watch)
     if parts is not None:
         parts.tasks = whole
+    numbers = {task.number for task, _ in computed}
     for task, outcome in computed:
         keep(task, outcome)
     try:
-        outcomes = [outcome for _, outcome in computed or run(whole, keep)]
+        computed = [*computed, *run([t for t in whole if t.number not in numbers], keep)]
     except SchedulerError as error:
         if not finished:
             raise
         raise SchedulerError(f"{error}; the sweep ended {progress()}") from None
     history = definition.settings.history and keeps_forces
-    return sweep_result(definition, merge(outcomes, history=history), model)
+    outcome = merge([outcome for _, outcome in computed], history=history)
+    return sweep_result(definition, outcome, model)
 
 
 def _outcomes(

@@ -64,11 +64,12 @@ from fecm.sweeps.random import (
     parse_correlation,
     random_cases,
 )
-from fecm.sweeps.reduced import MODES, REDUCED
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.search import with_level
 from fecm.sweeps.task import (
     MEASURES,
+    MODELS,
+    MODES,
     BuildFunction,
     Measure,
     MeasureFunction,
@@ -210,12 +211,12 @@ class Sweep:
         "then run in full, with all that its deck stores.",
         group="Result",
     )
-    model: Literal["reduced"] | None = option(
+    model: Literal["reduced", "full"] | None = option(
         None,
-        "Compute the cases of a nonlinear plate (NONL) together, in a few bending modes, instead "
-        "of by full runs; three of these check it.",
+        "Compute the cases of a nonlinear plate (NONL) together, in a few bending modes, or each "
+        "by a full run; by default in modes where that saves time and full runs agree.",
         group="Computation",
-        choices=[REDUCED],
+        choices=MODELS,
     )
     modes: int | None = option(
         None,
@@ -296,7 +297,8 @@ class Sweep:
             extra=measures,
             design=design,
             limits=_limits(self.exceed, system),
-            modes=reduced_mode_count(self.model, self.modes),
+            model=_checked_model(self.model),
+            modes=MODES if self.modes is None else self.modes,
             law=law,
             measured=measured,
         )
@@ -591,16 +593,11 @@ def check_draws(planned: Plan) -> None:
                 raise CasesError(f"{text}; {REMEDY}") from None
 
 
-def reduced_mode_count(model: str | None, modes: int | None) -> int | None:
-    """Return the number of bending modes of a model; None for full runs.
-
-    Raises CasesError if there is no such model.
-    """
-    if model is None:
-        return None
-    if model != REDUCED:
-        raise CasesError(f"unknown model {model!r}; there is {REDUCED!r}")
-    return MODES if modes is None else modes
+def _checked_model(model: str | None) -> str | None:
+    """Return the name of a model; CasesError if there is no such model."""
+    if model is not None and model not in MODELS:
+        raise CasesError(f"unknown model {model!r}; there are {' and '.join(map(repr, MODELS))}")
+    return model
 
 
 def _measures(

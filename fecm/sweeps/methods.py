@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 
@@ -48,22 +49,35 @@ from fecm.sweeps.in_full import (
 )
 from fecm.sweeps.limits import PEAK_FORCE, THRESHOLD
 from fecm.sweeps.outcome import About, Backend, Outcome, Status, merge
-from fecm.sweeps.price import expected, work_of_plates, work_of_runs
+from fecm.sweeps.price import expected, time_of_runs, work_of_plates, work_of_runs
 from fecm.sweeps.random import cost_of_plates, cost_of_runs
-from fecm.sweeps.reduced import MOST_MODES, reduction_bytes, tasks_beside_full_runs, tasks_of_search
+from fecm.sweeps.reduced import (
+    LIMIT,
+    MOST_MODES,
+    TRIALS,
+    MisfitError,
+    reduction_bytes,
+    tasks_beside_full_runs,
+    tasks_in_full,
+    tasks_of_search,
+)
 from fecm.sweeps.search import FIRST_VELOCITIES, Sought, search
 from fecm.sweeps.task import (
+    FULL,
     MOST_TOGETHER,
+    REDUCED,
     Method,
     Plan,
     Prepared,
     RunTasks,
     Settings,
     Task,
+    sharing,
 )
 
 MOST_REDUCED = 256  # impacts on a reduced plate at once, whose steps cost more
 MOST_IN_MOTION = 16  # full runs in one motion
+MOST_REDUCTION = 500_000_000  # bytes of a reduction that nobody asked for
 
 
 class SharedPlate(Method):
@@ -119,10 +133,10 @@ def _plate(
 class SharedResponse(SharedPlate):
     """Impacts on a linear plate by convolution with its response."""
 
-    def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
+    def applies(self, checked: Problem, settings: Settings, cases: Sequence[Case]) -> bool:
         """Return whether cases are impacts on linear plates that do nothing else."""
         is_run = settings.build is not None or settings.has_exposures
-        return not is_run and shares_plate(checked, names)
+        return not is_run and shares_plate(checked, cases[0])
 
     def backend(self, problem: Problem, settings: Settings) -> Backend:
         """Return the back end of a plate."""
@@ -154,64 +168,135 @@ def _runs_of_case(definition: Plan) -> int:
 class ReducedRuns(SharedPlate):
     """Impacts on a nonlinear plate in some bending modes, beside full runs of some cases."""
 
-    def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
+    limit: ClassVar[float] = LIMIT  # largest difference from full runs
+
+    def applies(self, checked: Problem, settings: Settings, cases: Sequence[Case]) -> bool:
         """Return whether the caller asks for the reduced model."""
-        return settings.modes is not None
+        return settings.model == REDUCED
 
     def refusal(self, checked: Problem, definition: Plan) -> str:
         """Explain why the reduced model does not suit a plan; empty if it does."""
-        settings, names, modes = definition.settings, definition.cases[0], definition.settings.modes
-        if settings.law is not None:
-            return (
-                f"the contact law {law_name(settings.law)} takes the place of EXPE, which the "
-                "reduced model needs: leave out the reduced model"
-            )
-        if not (isinstance(modes, int) and 1 <= modes <= MOST_MODES):
-            return f"the reduced model takes 1 to {MOST_MODES} bending modes, not {modes!r}"
-        if REFINE in names or "dt" in names:
-            return "the reduced model has a time step of its own: dt and refine can't vary"
-        if checked.plate.lifts:
-            return (
-                "the reduced model has no one-sided supports (UNIL): take full runs (leave out the "
-                "reduced model), or a window that holds (fecm new --window held)"
-            )
-        if not checked.deck.has(Nonlinear):
-            return "the reduced model is for decks with NONL; cases of others share a run"
-        if not only_impacts(checked):
-            return (
-                "the reduced model starts at rest, with impact steps of one size: the deck has "
-                "other steps, nodal forces or prescribed displacements"
-            )
-        return ""
+        return _unsuited(checked, definition.settings, definition.cases[0])
 
     def backend(self, problem: Problem, settings: Settings) -> Backend:
         """Return the back end of a plate."""
-        return BendingModes(problem, settings.measures, _modes(settings), settings.history)
+        return BendingModes(problem, settings.measures, settings.modes, settings.history)
 
     def most_cases(self, definition: Plan) -> int:
         """Return the number of cases that are advanced together."""
         return min(MOST_REDUCED, len(definition.cases))
 
-    def prepared(self, definition: Plan, run: RunTasks, watch: Watch) -> Prepared:
+    def prepared(self, checked: Problem, definition: Plan, run: RunTasks, watch: Watch) -> Prepared:
         """Compare the model with full runs; cases for which it does not hold are run in full."""
-        modes = _modes(definition.settings)
+        try:
+            return self.tried(definition, run, watch)
+        except MisfitError as error:
+            more = "take more modes, or full runs"
+            if definition.settings.modes >= MOST_MODES:
+                more = "these are all its modes; take full runs"
+            raise CasesError(f"{error}: {more} (`model` full)") from None
+
+    def tried(self, definition: Plan, run: RunTasks, watch: Watch) -> Prepared:
+        """Return the tasks by the model or in full; see :func:`prepared`."""
         if definition.settings.search is not None:
-            return tasks_of_search(definition, SEPARATE_RUNS, modes, run)
-        return tasks_beside_full_runs(definition, SEPARATE_RUNS, modes, run, watch)
+            return tasks_of_search(definition, SEPARATE_RUNS, self.limit, run)
+        return tasks_beside_full_runs(definition, SEPARATE_RUNS, self.limit, run, watch)
 
     def process_bytes(self, checked: Problem, settings: Settings, *, exact: bool) -> int:
         """Return the memory of a full run, or of the reduction if it takes more."""
         run = super().process_bytes(checked, settings, exact=exact)
-        return max(run, reduction_bytes(checked.plate, _modes(settings)))
+        return max(run, reduction_bytes(checked.plate, settings.modes))
+
+    def work(self, checked: Problem, definition: Plan) -> tuple[int, float]:
+        """Return the steps and the seconds of the cases, and of the full runs beside them."""
+        settings = replace(definition.settings, search=None)
+        tried = definition.cases[: TRIALS if definition.settings.search is None else 1]
+        runs = replace(definition, settings=settings, cases=tried, method=SEPARATE_RUNS)
+        works = super().work(checked, definition), work_of_runs(checked, runs)
+        steps, seconds = zip(*works, strict=True)
+        return sum(steps), sum(seconds)
 
     def most_forces(self, definition: Plan, steps: int) -> int:
         """Return the number of cases that are advanced together."""
         return self.most_cases(definition)
 
 
-def _modes(settings: Settings) -> int:
-    assert settings.modes is not None  # the method applies
-    return settings.modes
+@dataclass(frozen=True)
+class ReducedOrFullRuns(ReducedRuns):
+    """Impacts by the reduced model where full runs confirm it, and in full otherwise."""
+
+    limit = 0.01
+
+    def applies(self, checked: Problem, settings: Settings, cases: Sequence[Case]) -> bool:
+        """Return whether the model suits a plan, and saves half of the full runs."""
+        if settings.model is not None or settings.build or settings.measure:
+            return False
+        bytes_needed = reduction_bytes(checked.plate, settings.modes)
+        if _unsuited(checked, settings, cases[0]) or bytes_needed > MOST_REDUCTION:
+            return False
+        if settings.search is not None:
+            return True
+        plates, runs = (
+            len(sharing(method, cases, range(len(cases))))
+            for method in (self, _in_full(checked, settings, cases))
+        )
+        return runs >= 2 * (TRIALS + plates)
+
+    def refusal(self, checked: Problem, definition: Plan) -> str:
+        """Return an empty text: the method applies to what it can compute."""
+        return ""
+
+    def prepared(self, checked: Problem, definition: Plan, run: RunTasks, watch: Watch) -> Prepared:
+        """Compare the model with full runs; without one that agrees, all cases are run in full."""
+        try:
+            return self.tried(definition, run, watch)
+        except CasesError as error:
+            in_full = _in_full(checked, definition.settings, definition.cases)
+            watch.note(str(error), expected(checked, replace(definition, method=in_full), 0))
+            return Prepared(tasks_in_full(definition, in_full))
+
+    def expectation(self, checked: Problem, definition: Plan, workers: int | None) -> list[str]:
+        """Say that the model computes the cases, and what full runs would take."""
+        in_full = _in_full(checked, definition.settings, definition.cases)
+        count, modes = len(definition.cases), definition.settings.modes
+        runs = "three full runs" if definition.settings.search is None else "one full run"
+        seconds = time_of_runs(checked, replace(definition, method=in_full), workers)
+        text = (
+            f"{count} case{'s' * (count > 1)} by the reduced model with {modes} modes, checked by "
+            f"{runs}; in full (`model` full){seconds}"
+        )
+        return [*super().expectation(checked, definition, workers), text]
+
+
+def _in_full(checked: Problem, settings: Settings, cases: Sequence[Case]) -> Method:
+    """Return the method by which cases of a nonlinear plate are run in full."""
+    return method_of(checked, replace(settings, model=FULL), cases)
+
+
+def _unsuited(checked: Problem, settings: Settings, names: Collection[str]) -> str:
+    """Explain why the reduced model does not suit cases; empty if it does."""
+    if settings.law is not None:
+        return (
+            f"the contact law {law_name(settings.law)} takes the place of EXPE, which the "
+            "reduced model needs: leave out the reduced model"
+        )
+    if not (isinstance(settings.modes, int) and 1 <= settings.modes <= MOST_MODES):
+        return f"the reduced model takes 1 to {MOST_MODES} bending modes, not {settings.modes!r}"
+    if REFINE in names or "dt" in names:
+        return "the reduced model has a time step of its own: dt and refine can't vary"
+    if checked.plate.lifts:
+        return (
+            "the reduced model has no one-sided supports (UNIL): take full runs (leave out the "
+            "reduced model), or a window that holds (fecm new --window held)"
+        )
+    if not checked.deck.has(Nonlinear):
+        return "the reduced model is for decks with NONL; cases of others share a run"
+    if not only_impacts(checked):
+        return (
+            "the reduced model starts at rest, with impact steps of one size: the deck has "
+            "other steps, nodal forces or prescribed displacements"
+        )
+    return ""
 
 
 class InFull(Method):
@@ -249,7 +334,7 @@ class SharedMotion(InFull):
 
     shared = FAILURE_NAMES
 
-    def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
+    def applies(self, checked: Problem, settings: Settings, cases: Sequence[Case]) -> bool:
         """Return whether cases of a deck are run in full, each once and without a function."""
         obstacles = settings.build, settings.measure, settings.search
         in_full = settings.has_exposures or not checked.deck.is_linear
@@ -289,7 +374,7 @@ class SharedMotion(InFull):
 class SeparateRuns(InFull):
     """Full runs of each case, on a plate of its own, also by functions and for searches."""
 
-    def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
+    def applies(self, checked: Problem, settings: Settings, cases: Sequence[Case]) -> bool:
         """Return True: any case can be run alone."""
         return True
 
@@ -399,9 +484,15 @@ def _from_quick_models(problem: Problem, impacts: Impacts, levels: Floats) -> Im
 
 SEPARATE_RUNS = SeparateRuns()
 # The first one that applies computes a plan.
-METHODS: tuple[Method, ...] = (ReducedRuns(), SharedMotion(), SharedResponse(), SEPARATE_RUNS)
+METHODS: tuple[Method, ...] = (
+    ReducedRuns(),
+    ReducedOrFullRuns(),
+    SharedMotion(),
+    SharedResponse(),
+    SEPARATE_RUNS,
+)
 
 
-def method_of(checked: Problem, settings: Settings, names: Collection[str]) -> Method:
-    """Return the method for cases of a problem, whose values have these names."""
-    return next(method for method in METHODS if method.applies(checked, settings, names))
+def method_of(checked: Problem, settings: Settings, cases: Sequence[Case]) -> Method:
+    """Return the method for cases of a problem."""
+    return next(method for method in METHODS if method.applies(checked, settings, cases))

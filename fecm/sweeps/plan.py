@@ -27,6 +27,7 @@ from fecm.sweeps.random import Design
 from fecm.sweeps.search import Search, Sought, Until, search_of
 from fecm.sweeps.task import (
     MEASURES,
+    MODES,
     NO_COLUMNS,
     BuildFunction,
     Measure,
@@ -50,14 +51,16 @@ def plan(
     extra: Sequence[str] = (),
     design: Design | None = None,
     limits: Sequence[Limit] = (),
-    modes: int | None = None,
+    model: str | None = None,
+    modes: int = MODES,
     law: Law | None = None,
     measured: Mapping[str, MeasuredColumn] = NO_COLUMNS,
 ) -> Plan:
     """Create the plan of a sweep.
 
-    `extra` has names of :class:`Measure`, `until` the searched quantity. With `modes` the cases are
-    computed by the reduced model. `law` is a user's contact law that replaces the deck's law.
+    `extra` has names of :class:`Measure`, `until` the searched quantity. `model` is one of
+    :data:`~fecm.sweeps.task.MODELS`, or None for the one that suits a nonlinear plate; the reduced
+    model has `modes` bending modes. `law` is a user's contact law that replaces the deck's law.
     `measured` has the measured columns of the table of cases.
     Raises CasesError if the deck has no impact, names exclude each other, the deck lacks what is
     searched or measured, or the method refuses the plan.
@@ -88,12 +91,13 @@ def plan(
         build=build,
         measure=measure,
         measures=measures,
+        model=model,
         modes=modes,
         law=law,
     )
     if law is not None and build is None:
         check_law(law, cases[0])
-    method = method_of(checked, settings, cases[0].keys())
+    method = method_of(checked, settings, cases)
     definition = Plan(settings, tuple(cases), method, design, tuple(limits), measured)
     if refusal := method.refusal(checked, definition):
         raise CasesError(refusal)

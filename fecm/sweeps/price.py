@@ -36,21 +36,25 @@ def expected(problem: Problem, definition: Plan, workers: int | None) -> str:
     runs = "one full run each"
     if definition.settings.search is not None:
         runs = f"about {USUAL} full runs each"
-    motions = len(tasks(definition))
-    if motions < count:
+    if (motions := len(tasks(definition))) < count:
         runs = f"{motions} full run{'' if motions == 1 else 's'}"
-        count = motions
     words = problem.deck.nonlinear_words
-    text = f"a plate with {words} has no impulse response: {cases}, {runs}"
+    seconds = time_of_runs(problem, definition, workers)
+    return f"a plate with {words} has no impulse response: {cases}, {runs}{seconds}"
+
+
+def time_of_runs(problem: Problem, definition: Plan, workers: int | None) -> str:
+    """Say about how long the full runs of a plan take; empty if that is not known."""
     _, seconds = work_of_runs(problem, definition)
     if math.isnan(seconds):
-        return text
+        return ""
+    count = len(tasks(definition))
     if workers is None:
         workers = free_processors() if seconds >= WORTH_WORKERS else 1
     where = f" by {workers} workers" if workers > 1 else ""
     if not workers:
         where = " of computation"
-    return f"{text}: about {_rounded(seconds / max(1, min(workers, count)))}{where}"
+    return f": about {_rounded(seconds / max(1, min(workers, count)))}{where}"
 
 
 def work_of_plates(problem: Problem, definition: Plan) -> tuple[int, float]:

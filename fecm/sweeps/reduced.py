@@ -70,8 +70,6 @@ PLATE_PHASE = 1.5
 PROJECTILE_PHASE = 0.2
 # A contact that is still stiffer is left to the balance of energy.
 MOST_HALVINGS = 10
-REDUCED = "reduced"  # name of the model
-MODES = 13  # bending modes of the model, if the caller gives no number
 MOST_MODES = 40
 
 
@@ -211,8 +209,13 @@ def largest_time_steps(plate: ReducedPlate, impacts: Impacts) -> Floats:
 
 GROUP = "reduced"
 LIMIT = 0.02  # largest difference of the peaks, relative to the full run
+TRIALS = 3  # cases that are run in full where the model holds
 MEASURED_TRIALS = ("exposure", "gage_strain")
 TRIAL_COLUMNS = tuple(d.name for d in SWEEP_DATASETS.values() if d.group == GROUP)
+
+
+class MisfitError(CasesError):
+    """The reduced model differs too much from full runs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,6 +231,8 @@ class ReducedModel:
         ``deflection_ratio`` by the model; ``full_peak_force`` and ``full_deflection_ratio`` by the
         full runs. Where they are measured, ``exposure`` and ``gage_strain`` are those of the
         criterion and of the gage that differ most.
+    limit : float
+        Largest difference that is allowed, relative to the full run.
     in_full : int
         Number of cases, with the largest energies, that were run in full because the model differs
         too much.
@@ -235,6 +240,7 @@ class ReducedModel:
 
     modes: int
     columns: dict[str, Column]
+    limit: float = LIMIT
     in_full: int = 0
 
     def difference(self, name: str) -> Column:
@@ -260,7 +266,7 @@ class ReducedModel:
             yield ("", f"{', '.join(parts)} (case {case})")
         if self.in_full:
             cases = "1 case" if self.in_full == 1 else f"{self.in_full} cases"
-            yield ("", f"{cases} of the largest energies: in full, as above {LIMIT:.0%}")
+            yield ("", f"{cases} of the largest energies: in full, as above {self.limit:.0%}")
 
     @property
     def measured(self) -> list[str]:
@@ -268,13 +274,10 @@ class ReducedModel:
         return [name for name in MEASURED_TRIALS if name in self.columns]
 
     def check(self) -> None:
-        """Raise CasesError if a quantity differs by more than the limit."""
+        """Raise MisfitError if a quantity differs by more than the limit."""
         name, _ = self._worst
-        if not abs(self.difference(name)).max() <= LIMIT:
-            remedy = "take more modes, or full runs (leave out the reduced model)"
-            if self.modes >= MOST_MODES:
-                remedy = "these are all its modes; take full runs: leave out the reduced model"
-            raise CasesError(f"{self._misfit}; at most {LIMIT:.0%} is allowed: {remedy}")
+        if not abs(self.difference(name)).max() <= self.limit:
+            raise MisfitError(f"{self._misfit}; at most {self.limit:.0%} is allowed")
 
     @property
     def note(self) -> str:
@@ -326,11 +329,12 @@ class Trials:
     """Cases that were run in full, by the method `in_full`, and by the model.
 
     The tasks of case n have the numbers `count` + 2 n and, by the model, `count` + 2 n + 1: they
-    follow the numbers of the tasks of all `count` cases.
+    follow the numbers of the tasks of all `count` cases. `limit` is the largest difference.
     """
 
-    def __init__(self, definition: Plan, in_full: Method, run: RunTasks) -> None:
+    def __init__(self, definition: Plan, in_full: Method, limit: float, run: RunTasks) -> None:
         self._definition, self._in_full, self._run = definition, in_full, run
+        self._limit = limit
         self._fulls: dict[int, Outcome] = {}
         self._models: dict[int, Outcome] = {}
 
@@ -358,9 +362,9 @@ class Trials:
                 self._models[case] = outcomes[model_task.number]
         full, model = self._merged()
         forces = [part.columns[About.REACHED] for part in (model, full)]
-        fits = np.abs(forces[0] - forces[1]) <= LIMIT * forces[1]
+        fits = np.abs(forces[0] - forces[1]) <= self._limit * forces[1]
         for modelled, in_full in measured_pairs(model, full).values():
-            fits &= ~(np.abs(modelled - in_full) > LIMIT * in_full)  # open values fit
+            fits &= ~(np.abs(modelled - in_full) > self._limit * in_full)  # open values fit
         holds = ~full.fine | (model.fine & fits)
         return {number for number, part in zip(full.numbers, holds, strict=True) if not part}
 
@@ -370,25 +374,29 @@ class Trials:
         full, model = (merge(outcomes, history=False) for outcomes in parts)
         return full, model
 
-    def compared(self, modes: int) -> ReducedModel:
+    def compared(self) -> ReducedModel:
         """Compare the model with the full runs.
 
         Raises CasesError if all failed.
         """
-        return compared(modes, *self._merged())
+        return compared(self._definition.settings.modes, *self._merged(), self._limit)
+
+    def outcomes(self) -> Iterator[tuple[Task, Outcome]]:
+        """Yield the tasks of the full runs and their outcomes."""
+        return ((self.full_run(case), outcome) for case, outcome in self._fulls.items())
 
 
 def tasks_beside_full_runs(
-    definition: Plan, in_full: Method, modes: int, run: RunTasks, watch: Watch
+    definition: Plan, in_full: Method, limit: float, run: RunTasks, watch: Watch
 ) -> Prepared:
     """Compare the reduced model with full runs, and return the tasks by the model or in full.
 
-    Raises CasesError if the model holds for no case.
+    Raises MisfitError if the model holds for no case, and CasesError if it can't be checked.
     """
     ordered = by_energy(definition)
-    tried = Trials(definition, in_full, run)
+    tried = Trials(definition, in_full, limit, run)
     held = count_held(ordered, tried.failing)
-    model = replace(tried.compared(modes), in_full=len(ordered) - held)
+    model = replace(tried.compared(), in_full=len(ordered) - held)
     if not held:
         model.check()
     beyond = set(ordered[held:])
@@ -397,13 +405,21 @@ def tasks_beside_full_runs(
     watch.note(model.note)
     rest = [case for case in range(len(definition.cases)) if case not in beyond]
     fulls = [tried.full_run(case) for case in sorted(beyond)]
-    return Prepared([*tasks(definition, rest), *fulls], model)
+    computed = [(task, part) for task, part in tried.outcomes() if beyond.issuperset(task.numbers)]
+    return Prepared([*tasks(definition, rest), *fulls], model, computed)
 
 
-def tasks_of_search(definition: Plan, in_full: Method, modes: int, run: RunTasks) -> Prepared:
+def tasks_in_full(definition: Plan, in_full: Method) -> list[Task]:
+    """Return the tasks of full runs of all cases, with numbers after those of :class:`Trials`."""
+    first = 3 * len(definition.cases)
+    whole = tasks(replace(definition, method=in_full))
+    return [replace(task, number=first + task.number) for task in whole]
+
+
+def tasks_of_search(definition: Plan, in_full: Method, limit: float, run: RunTasks) -> Prepared:
     """Search the velocities of cases by the model, and confirm the highest energy by a full run.
 
-    Raises CasesError if the model does not hold there.
+    Raises MisfitError if the model does not hold there, and CasesError if it can't be checked.
     """
     whole = tasks(definition)
     done = run(whole)
@@ -422,7 +438,7 @@ def tasks_of_search(definition: Plan, in_full: Method, modes: int, run: RunTasks
         for place, method in enumerate((in_full, definition.method))
     ]
     confirmed = {task.number: part for task, part in run(pair)}
-    model = compared(modes, confirmed[count], confirmed[count + 1])
+    model = compared(settings.modes, confirmed[count], confirmed[count + 1], limit)
     model.check()
     return Prepared(whole, model, done)
 
@@ -452,7 +468,7 @@ def count_held(ordered: Sequence[int], failing: Callable[[Iterable[int]], set[in
     return held
 
 
-def compared(modes: int, full: Outcome, model: Outcome) -> ReducedModel:
+def compared(modes: int, full: Outcome, model: Outcome, limit: float = LIMIT) -> ReducedModel:
     """Compare outcomes of the trials.
 
     Raises CasesError if all failed.
@@ -477,6 +493,7 @@ def compared(modes: int, full: Outcome, model: Outcome) -> ReducedModel:
                 for prefix, values in zip(("", "full_"), pair, strict=True)
             },
         },
+        limit,
     )
 
 
@@ -509,7 +526,7 @@ def measured_pairs(model: Outcome, full: Outcome) -> dict[str, tuple[Floats, Flo
 def reduced_attributes(model: ReducedModel) -> dict[str, Any]:
     """Return the attributes of the group in the file."""
     in_full = {"in_full": model.in_full} if model.in_full else {}
-    return {"modes": model.modes, **in_full}
+    return {"modes": model.modes, "limit": model.limit, **in_full}
 
 
 def reduced_of(contents: FileContents) -> ReducedModel | None:
@@ -520,8 +537,9 @@ def reduced_of(contents: FileContents) -> ReducedModel | None:
     if GROUP not in contents.groups:
         return None
     try:
-        modes = int(contents.groups[GROUP]["modes"])
-        in_full = int(contents.groups[GROUP].get("in_full", 0))
+        about = contents.groups[GROUP]
+        modes, in_full = int(about["modes"]), int(about.get("in_full", 0))
+        limit = float(about.get("limit", LIMIT))  # earlier files lack it
         columns = {
             name: contents[f"{GROUP}/{name}"]
             for name in TRIAL_COLUMNS
@@ -532,7 +550,7 @@ def reduced_of(contents: FileContents) -> ReducedModel | None:
         raise ResultFileError(message) from None
     if len({np.shape(values) for values in columns.values()}) != 1:
         raise ResultFileError(f"{contents.path}: columns of the reduced model differ in length")
-    return ReducedModel(modes, columns, in_full)
+    return ReducedModel(modes, columns, limit, in_full)
 
 
 def reduction_bytes(model: PlateModel, modes: int) -> int:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -38,6 +38,9 @@ BuildFunction = Callable[[dict[str, Any]], Deck]  # of a case, whose values are 
 MeasureFunction = Callable[[Result], Mapping[str, float]]
 NO_COLUMNS: Mapping[str, MeasuredColumn] = {}
 MOST_TOGETHER = 2048  # cases advanced together
+REDUCED, FULL = "reduced", "full"  # models of a nonlinear plate
+MODELS = (REDUCED, FULL)
+MODES = 13  # bending modes of the reduced model, if the caller gives no number
 WORTH_WORKERS = 10.0  # seconds that tasks take, from which on workers are worth their start
 
 
@@ -63,7 +66,8 @@ class Settings:
     build: BuildFunction | None = None  # makes the deck of a case
     measure: MeasureFunction | None = None  # computes more columns from the result of a case
     measures: tuple[Measure, ...] = ()  # more columns
-    modes: int | None = None  # bending modes of the reduced model; None of full plates
+    model: str | None = None  # that the caller asks for: REDUCED, FULL, or None for either
+    modes: int = MODES  # bending modes of the reduced model
     law: Law | None = None  # a user's contact law instead of the deck's
 
     @property
@@ -94,7 +98,8 @@ class Plan:
             settings.search,
         ]
         law = () if settings.law is None else (law_name(settings.law),)
-        text = json.dumps([*parts, settings.measures, settings.modes, MOST_TOGETHER, *law])
+        model = (type(self.method).__name__, settings.modes)
+        text = json.dumps([*parts, settings.measures, model, MOST_TOGETHER, *law])
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -122,7 +127,7 @@ class Prepared(NamedTuple):
 
     tasks: list[Task]
     model: ReducedModel | None = None
-    outcomes: Sequence[tuple[Task, Outcome]] = ()  # of all tasks, if they are known
+    outcomes: Sequence[tuple[Task, Outcome]] = ()  # of the tasks that are computed
 
 
 class Method(ABC):
@@ -132,8 +137,8 @@ class Method(ABC):
     """
 
     @abstractmethod
-    def applies(self, checked: Problem, settings: Settings, names: Collection[str]) -> bool:
-        """Return whether the method is for cases of a problem whose values have these names.
+    def applies(self, checked: Problem, settings: Settings, cases: Sequence[Case]) -> bool:
+        """Return whether the method is for cases of a problem, which all have the same names.
 
         It is asked after the methods before it in the table.
         """
@@ -150,7 +155,7 @@ class Method(ABC):
         """Return whether cases of a task have the same value of a name."""
         return name in OF_PLATE
 
-    def prepared(self, definition: Plan, run: RunTasks, watch: Watch) -> Prepared:
+    def prepared(self, checked: Problem, definition: Plan, run: RunTasks, watch: Watch) -> Prepared:
         """Return the tasks of a plan; `run` computes tasks that decide which they are."""
         return Prepared(tasks(definition))
 
@@ -185,20 +190,26 @@ def tasks(definition: Plan, cases: Sequence[int] | None = None) -> list[Task]:
     """Split a plan, or some of its cases, into tasks."""
     settings, method = definition.settings, definition.method
     together = method.most_cases(definition)
-    names = [name for name in definition.cases[0] if method.separates(name)]
-    sharing: dict[tuple[Value, ...], list[int]] = {}
-    for number in range(len(definition.cases)) if cases is None else cases:
-        key = tuple(definition.cases[number][name] for name in names)
-        sharing.setdefault(key, []).append(number)
+    chosen = range(len(definition.cases)) if cases is None else cases
     parts = [
         tuple(numbers[start : start + together])
-        for numbers in sharing.values()
+        for numbers in sharing(method, definition.cases, chosen)
         for start in range(0, len(numbers), together)
     ]
     return [
         Task(settings, method, number, numbers, tuple(definition.cases[n] for n in numbers))
         for number, numbers in enumerate(parts)
     ]
+
+
+def sharing(method: Method, cases: Sequence[Case], chosen: Iterable[int]) -> list[list[int]]:
+    """Group the numbers of some of the cases by the values in which a task's cases agree."""
+    names = [name for name in cases[0] if method.separates(name)]
+    groups: dict[tuple[Value, ...], list[int]] = {}
+    for number in chosen:
+        key = tuple(cases[number][name] for name in names)
+        groups.setdefault(key, []).append(number)
+    return [*groups.values()]
 
 
 def run_task(task: Task) -> Outcome:
