@@ -16,6 +16,7 @@ from fecm.mechanics.reduced_plate import ReducedFields, reduced_plate
 from fecm.mechanics.solutions import static_response
 from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
+from fecm.results.metrics import EXPOSURES
 from fecm.sweeps import methods
 from fecm.sweeps.in_full import run_in_full
 from tests.calls import call
@@ -74,6 +75,32 @@ def test_they_are_in_a_plate_whose_bending_stretches_it() -> None:
     deck = coupled(DECK)
     model = fecm.sweep(deck, given, model="reduced", modes=ENOUGH, measure=MEASURED)
     compare(model, fecm.sweep(deck, given, measure=MEASURED))
+
+
+@pytest.mark.long
+def test_random_impacts_have_the_peaks_failures_and_probabilities_of_64_full_runs() -> None:
+    random = {"velocity": "uniform:300,1200", "k": "lognormal:5e4,.15"}
+    given: dict[str, Any] = {"random": random, "samples": 64, "measure": "failure"}
+    given |= {"exceed": {"peak_force": [200.0, 300.0]}}
+    deck = DECK.replace(STRENGTHS, "ALLO\n1.1E6,1.1E6,5.5E4,2.2E5,9.9E4,9.9E4,6.E4\n\n")
+    swept = fecm.sweep(deck, **given)
+    full = fecm.sweep(deck, model="full", **given)
+    assert swept.reduced is not None
+    assert swept.reduced.in_full == 0
+    np.testing.assert_allclose(swept["peak_force"], full["peak_force"], rtol=1e-2)
+    names = [name for name in EXPOSURES if np.isfinite(full.summary.get(name, np.nan)).all()]
+    exposures, in_full = (np.array([part[name] for name in names]) for part in (swept, full))
+    assert len(names) == 4
+    np.testing.assert_allclose(exposures, in_full, rtol=1e-2)
+    np.testing.assert_array_equal(exposures.argmax(axis=0), in_full.argmax(axis=0))
+    failed = (exposures >= 1.0).any(axis=0)
+    np.testing.assert_array_equal(failed, (in_full >= 1.0).any(axis=0))
+    assert 5 < failed.sum() < 59
+    assert swept.random is not None
+    assert full.random is not None
+    chances = full.random.exceedance.probability
+    assert np.all((chances > 0.1) & (chances < 0.9))
+    np.testing.assert_array_equal(swept.random.exceedance.probability, chances)
 
 
 def test_strengths_of_a_case_change_its_exposures_alone() -> None:

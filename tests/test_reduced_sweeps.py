@@ -326,23 +326,6 @@ def test_a_case_does_not_depend_on_the_others(swept: fecm.SweepResult) -> None:
         np.testing.assert_equal(again[name][0], swept[name][2])
 
 
-@pytest.mark.long
-def test_random_values_are_by_the_model_too() -> None:
-    sweep_result = fecm.sweep(
-        DECK,
-        random={"k": "uniform:4e4,6e4"},
-        samples=16,
-        exceed={"peak_force": 150.0},
-        model="reduced",
-        modes=ENOUGH,
-    )
-    assert sweep_result.random is not None
-    assert sweep_result.reduced is not None
-    assert sweep_result.reduced.columns["case"].shape == (3,)
-    assert sweep_result.random.statistics["peak_force"].draws == 16
-    assert 150.0 < sweep_result["peak_force"].min() < sweep_result["peak_force"].max() < 210.0
-
-
 def test_an_elastic_rod_hits_the_reduced_plate_as_the_full_one() -> None:
     deck = text(WHOLE, data=ROD)
     given = {"velocity": [300.0]}
