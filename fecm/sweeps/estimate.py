@@ -78,8 +78,9 @@ class Estimate:
         ``"infinite plate"``, ``"static plate"`` and ``"nonlinear static plate"``, as far as the
         plate has them, and the ``"run"``.
     remarks : dict of str to str
-        What models neglect (``"damping"``, ``"preload"``, ``"curvature"``, ``"gaps"``), and how
-        good the static model of a nonlinear plate is, or why it is missing (``"stretching"``).
+        What models neglect (``"damping"``, ``"preload"``, ``"curvature"``, ``"gaps"``), how good
+        the static model of a nonlinear plate is, or why it is missing (``"stretching"``), and by
+        which model the run's velocity at the threshold was found (``"velocity"``).
     notes : tuple of str
         Reasons to doubt the numbers.
     units : dict of str to str
@@ -206,7 +207,7 @@ def estimate(deck: str | Path | Deck) -> Estimate:
 def estimate_problem(problem: Problem) -> Estimate:
     """Estimate the impact of a checked problem; raises StudyError as :func:`estimate`."""
     quick = by_quick_models(problem)
-    of_run, bent, doubts = _run_itself(problem, quick.mass)
+    of_run, searched, bent, doubts = _run_itself(problem, quick.mass)
     if not problem.plate.nonlinear:
         bent = [*_bent_statically(quick, problem.judge), *bent]
     if bent:
@@ -230,6 +231,8 @@ def estimate_problem(problem: Problem) -> Estimate:
         words = from_threshold(problem.threshold.number)
         first = "; plies and interfaces may fail before" if words == AT_THE_LATEST else ""
         remarks["threshold"] = f"delamination {words} these forces and energies{first}"
+    if searched:
+        remarks["velocity"] = searched
     if quick.remark:
         remarks["stretching"] = quick.remark
     return Estimate(
@@ -260,17 +263,25 @@ def _rows(quick: QuickEstimate) -> dict[str, ModelEstimate]:
     }
 
 
-def _run_itself(problem: Problem, mass: float) -> tuple[ModelEstimate, list[str], list[str]]:
-    """Return the run itself, notes about its deflections, and notes about what is open in it."""
+def _run_itself(problem: Problem, mass: float) -> tuple[ModelEstimate, str, list[str], list[str]]:
+    """Return the run itself, how its velocity was found, and notes.
+
+    The notes are about its deflections, and about what is open in it.
+    """
     result = carry_out_plan(problem, plan(problem, [{}]))
     swept, doubts = {"the run": result}, []
-    threshold = velocity = math.nan
+    threshold, velocity, searched = math.nan, math.nan, ""
     if problem.threshold is not None:
         threshold = problem.threshold.force
         swept["the run at the threshold"] = carry_out_plan(
             problem, plan(problem, [{}], until=threshold)
         )
         velocity = float(swept["the run at the threshold"]["found_velocity"][0])
+        if (model := swept["the run at the threshold"].reduced) is not None:
+            (difference,) = model.difference("peak_force")
+            searched = (
+                f"of the run: by the reduced model, {difference:+.2%} from the force of a full run"
+            )
     peak, duration = (float(result[name][0]) for name in ("peak_force", "contact_time"))
     if math.isnan(duration):
         doubts.append("the run ends before its contact does: what is open needs a longer duration")
@@ -287,7 +298,7 @@ def _run_itself(problem: Problem, mass: float) -> tuple[ModelEstimate, list[str]
     ]
     energy = 0.5 * mass * velocity**2
     row = ModelEstimate(peak, duration, threshold, velocity, energy, applies=True)
-    return row, bent, doubts
+    return row, searched, bent, doubts
 
 
 def _bent_statically(quick: QuickEstimate, judge: Judge) -> list[str]:

@@ -212,9 +212,8 @@ class ReducedRuns(SharedPlate):
         settings = replace(definition.settings, search=None)
         tried = definition.cases[: TRIALS if definition.settings.search is None else 1]
         runs = replace(definition, settings=settings, cases=tried, method=SEPARATE_RUNS)
-        works = super().work(checked, definition), work_of_runs(checked, runs)
-        steps, seconds = zip(*works, strict=True)
-        return sum(steps), sum(seconds)
+        (steps, seconds), of_runs = super().work(checked, definition), work_of_runs(checked, runs)
+        return steps + of_runs[0], seconds + of_runs[1]
 
     def most_forces(self, definition: Plan, steps: int) -> int:
         """Return the number of cases that are advanced together."""
