@@ -12,7 +12,7 @@ import pytest
 
 import fecm
 from fecm.authoring.values import apply_case
-from fecm.exploration.places import ModalPlate
+from fecm.exploration.places import ModalResponses
 from fecm.problem.loading import load_deck, load_one
 from fecm.sweeps.backends import ImpulseResponse
 from tests.browser import Browser, find_browser
@@ -29,14 +29,14 @@ DAMPED = SUPPORTED.to_text().replace("EXPE", "DAMP\n5000.,\nEXPE", 1)
 def test_the_response_in_all_modes_is_that_of_a_run(deck: str, at: str) -> None:
     problem = load_one(apply_case(load_one(deck).deck, {"at": at}))
     exact = ImpulseResponse(problem).response
-    plate = ModalPlate(problem, 10_000)
+    plate = ModalResponses(problem, 10_000)
     actual = plate.response(plate.own, exact.dt, exact.steps)
     np.testing.assert_allclose(actual, exact.response, 0.0, 1e-9 * np.abs(exact.response).max())
 
 
 @pytest.mark.parametrize("count", [1, 8])
 def test_a_few_modes_keep_the_static_compliance_of_every_place(count: int) -> None:
-    plate = ModalPlate(load_one(SUPPORTED), count)
+    plate = ModalResponses(load_one(SUPPORTED), count)
     places = [*plate.places()]
     assert len(places) == 25  # inner corners of 6 x 6 elements
     for place in places[::6]:
@@ -57,7 +57,7 @@ def codes(deck: fecm.Deck) -> set[str]:
 
 def test_an_impact_moves_only_to_where_a_run_has_no_other_warning() -> None:
     problem = load_one(HELD)
-    plate = ModalPlate(problem, 1)
+    plate = ModalResponses(problem, 1)
     places = [*plate.places()]
     low, high = ((places[end].x, places[end].y) for end in (0, -1))
     for x, y in (low, high):

@@ -10,6 +10,7 @@ that of the run.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from fecm.authoring.plate_values import set_place
 from fecm.deck.findings import Findings
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.mesh import extent
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.reduced_plate import lanczos, ritz_vectors
 from fecm.mechanics.solutions import Modes, Tangent, modes
 from fecm.problem.check import check_place
@@ -41,8 +43,25 @@ class Place(NamedTuple):
     stiffness: Floats  # (BESIDE,): squares of the angular frequencies of the Ritz vectors
 
 
-class ModalPlate:
-    """A plate that is held, in its lowest modes."""
+@dataclass(frozen=True)
+class _MovedProblem(Problem):
+    """Problem whose deck differs from that of another in the place of the impact alone."""
+
+    other: Problem
+
+    @property
+    def plate(self) -> PlateModel:
+        """The plate, which both share."""
+        return self.other.plate
+
+    @property
+    def outside_supports(self) -> Bools:
+        """Whether every element lies on a free rim outside the supports, (numel,)."""
+        return self.other.outside_supports
+
+
+class ModalResponses:
+    """Responses of a plate that is held, in its lowest modes, to forces at places."""
 
     def __init__(self, problem: Problem, count: int) -> None:
         self._problem, self._plate = problem, problem.moving_plate
@@ -70,7 +89,8 @@ class ModalPlate:
             if mesh.codes[node, W]:
                 continue
             x, y = mesh.coordinates[node].tolist()
-            moved = problem.moved(set_place(problem.deck, f"{x!r},{y!r}"))
+            deck = set_place(problem.deck, f"{x!r},{y!r}")
+            moved = _MovedProblem(deck, mesh, problem.program, problem)
             if not _findings(moved) <= own or moved.laminate_number != number:
                 continue
             if self._mass(moved) >= LIGHT * mass or not unstable_contact(moved):

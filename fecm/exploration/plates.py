@@ -25,7 +25,7 @@ from fecm.authoring.time_values import duration_of, with_clock
 from fecm.authoring.values import apply_case
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
-from fecm.exploration.places import ModalPlate, picture
+from fecm.exploration.places import ModalResponses, picture
 from fecm.judge.limits import (
     ENERGY_BALANCE,
     INDENTATION,
@@ -157,7 +157,7 @@ class LinearPlate(PagePlate):
 
     def places(self, modes: int) -> dict[str, Any]:
         """Return the places, whose responses are compared with the exact one at the deck's."""
-        plate, exact = ModalPlate(self._problem, modes), self._backend
+        plate, exact = ModalResponses(self._problem, modes), self._backend
         own, response, modal = plate.own, exact.response, replace(exact)
         modal.response = response._replace(
             response=plate.response(own, response.dt, response.steps)

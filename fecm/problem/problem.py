@@ -90,13 +90,6 @@ class Problem:
         """Return the deck, mesh and program: a copy in another process builds its own parts."""
         return {"deck": self.deck, "mesh": self.mesh, "program": self.program}
 
-    def moved(self, deck: Deck) -> Problem:
-        """Return the problem of a deck with another place of the impact; they share the plate."""
-        moved = replace(self, deck=deck)
-        for name in ("plate", "outside_supports"):
-            vars(moved)[name] = getattr(self, name)
-        return moved
-
     @cached_property
     def rules(self) -> tuple[Quadrature, Quadrature, Quadrature]:
         """Quadrature of bending, transverse shear and stored strains."""
