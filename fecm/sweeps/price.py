@@ -12,6 +12,7 @@ from fecm._machine import free_processors
 from fecm.authoring.case import Case, CasesError
 from fecm.authoring.time_values import duration_of
 from fecm.authoring.values import REFINE
+from fecm.deck.macros import EXTENDED
 from fecm.problem.problem import Problem
 from fecm.results.metrics import SUMMARY
 from fecm.results.sinks import MemorySink
@@ -94,7 +95,8 @@ def work_of_runs(problem: Problem, definition: Plan) -> tuple[int, float]:
     duration = duration_of(problem)
     steps = sum(_full_steps(cases[0], duration, problem.work.steps) for cases in motions)
     before, step = _costs(problem, definition.settings, motions[0])
-    return int(each * steps), each * (before * len(motions) + step * steps)
+    usual = steps / EXTENDED if problem.work.at_most else steps  # OVER ends a run long before
+    return int(each * steps), each * (before * len(motions) + step * usual)
 
 
 def _costs(problem: Problem, settings: Settings, cases: Sequence[Case]) -> tuple[float, float]:
