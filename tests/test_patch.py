@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import fecm
+from fecm.deck.model import Patch
 from fecm.mechanics.laminate import laminate
 from fecm.mechanics.mesh import MeshArrays
 from fecm.mechanics.plate import PlateModel
@@ -23,6 +25,7 @@ from tests.builders import (
     table,
     with_restraints,
 )
+from tests.decks import small
 
 CROSS_PLY = laminate(REPORT_PLY, 5 * (0.0, 90.0) + 5 * (90.0, 0.0), [0.0053] * 20)
 
@@ -126,3 +129,13 @@ def test_a_patch_must_be_on_the_plate() -> None:
     with pytest.raises(PatchError, match="not on the plate"):
         patch_weights(hole, DISC, 0.2, 0.5, 0.5)
     assert patch_weights(mesh, DISC, 0.5, 0.5, 0.5).sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0), (5.0, 0.0), (0.0, 5.0), (None, None)])
+def test_a_centre_with_a_coordinate_of_0_is_written_and_read_again(
+    centre: tuple[float | None, float | None],
+) -> None:
+    patch = Patch("HERT", None, *centre)
+    deck = fecm.read_one(small())
+    written = replace(deck, segments=(*deck.segments, patch)).to_text()
+    assert fecm.read_one(written).last(Patch) == patch

@@ -287,7 +287,9 @@ class Record:
     )
     fields: ClassVar[Fields]
     packed: ClassVar[slice | None] = None  # values of the card that one attribute holds as a tuple
-    optional: ClassVar[int] = 0  # number of trailing values that are left out where they are 0
+    optional: ClassVar[int] = (
+        0  # number of trailing values that are left out where a blank is read alike
+    )
 
     @classmethod
     def from_row(cls, values: Sequence[Value], source: CardSource | None) -> Self:
@@ -316,8 +318,12 @@ class Record:
         """Return the text of the card; pass `fields` if they depend on the control card."""
         written = fields or self.fields
         values = self.row()[: len(written)]
+        # The first attribute is the source.
+        blank_at_zero = [a.default is not None for a in dataclasses.fields(self)[1:]]
         least = len(written) - self.optional
         while len(values) > least and not values[-1]:
+            if values[-1] != BLANK and not blank_at_zero[len(values) - 1]:
+                break
             values.pop()
         return write_card(written[: len(values)], values)
 
