@@ -28,6 +28,7 @@ from fecm.sweeps.outcome import Outcome
 DELAY = "delay"  # measured time at which the projectile touches the plate
 OFFSET = "offset"  # measured force without a contact
 OF_RECORD = {DELAY: "time", OFFSET: "force"}  # dimensions of the parameters of the record
+STEP = 1e-3  # half the step of central differences in delay and offset
 POINTS = 10  # fewest measured points of a fit
 LOST = 0.2  # largest share of the contact's points that may be outside the run of the deck
 SINGULAR = 1e-3  # smallest allowed singular value of the Jacobian with unit columns
@@ -218,11 +219,13 @@ def _least_squares(
 
     time, force = measured.time[inside], measured.force[inside]
     peak = float(np.abs(force).max()) or 1.0
+    of_impact = model.plate.step
+    steps = np.diag([STEP if name in OF_RECORD else of_impact for name in scaling.start])
 
     @lru_cache(maxsize=1)
     def evaluate(*parameters: float) -> tuple[Floats, Floats]:
         """Return force over peak and its Jacobian."""
-        x, steps = np.array(parameters), model.plate.step * np.eye(len(parameters))
+        x = np.array(parameters)
         up, down = np.minimum(x + steps, scaling.high), np.maximum(x - steps, scaling.low)
         forces = model.at(time, [scaling.values(row) for row in (x, *up, *down)]) / peak
         above, below = np.split(forces[:, 1:], 2, axis=1)

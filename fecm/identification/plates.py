@@ -58,7 +58,7 @@ class ExactPlate:
     problem: Problem
     backend: Backend
     is_exact: ClassVar[bool] = True
-    step: ClassVar[float] = 1e-3  # half that of central differences in the scaled parameters
+    step: ClassVar[float] = 1e-3  # half that of central differences in scaled values of the impact
     settled: ClassVar[float] = 1e-7  # step of a fit, relative to the scaled parameters, at its end
 
     @property
@@ -116,7 +116,7 @@ class ModalPlate(ExactPlate):
     is_exact: ClassVar[bool] = False
     # The force has fast vibrations, of some .1 % of the peak, which full runs don't have.  Their
     # phase changes as soon as k changes by .1 %.
-    step: ClassVar[float] = 0.05
+    step: ClassVar[float] = 0.1
     settled: ClassVar[float] = 1e-2
 
     @property
