@@ -17,6 +17,7 @@ from fecm.deck.units import unit_names
 from fecm.location.table import strain_table
 from fecm.results.groups import NotStoredError
 from tests.calls import Done, call, record_of
+from tests.decks import small
 from tests.panels import OFF_AXIS, STRUCK, TIME, Floats, panel, scatter, struck, with_gages
 
 NEAR = (40.0, 30.0, 80.0, 65.0)
@@ -187,8 +188,12 @@ def test_decks_that_cant_be_located_on_are_refused() -> None:
         nonlinear=True,
         gages=OFF_AXIS,
     )
-    with pytest.raises(StudyError, match="linear plate"):
-        fecm.locate(stretching, table)
+    for option in ("shift", "gains"):
+        with pytest.raises(StudyError, match="shift and gains are for linear plates"):
+            fecm.locate(stretching, table, **{option: True})  # type: ignore[arg-type]
+    lifting = with_gages(fecm.read_one(small().replace("ROD\n", "UNIL\n13,0,1,0.,0.\n\nROD\n", 1)))
+    with pytest.raises(StudyError, match=r"UNIL, from which the plate lifts off: .*--window held"):
+        fecm.locate(lifting, table)
     one = with_gages(deck(), (22.0, 18.0, 0.72, 0.0))
     with pytest.raises(StudyError, match=r"1 gages \(GAGE\)"):
         fecm.locate(one, table)

@@ -88,6 +88,26 @@ LARGE_MESH_ERROR = ModelLimit(
     note="elements half as long move the place by {length}, which is in the standard deviations",
     remedy="take a finer mesh",
 )
+# Share of the largest strain.
+UNCONFIRMED_STRAINS = ModelLimit(
+    "difference from the run of the whole plate",
+    0.02,
+    note="the fitted strains differ by up to {largest:.1%} of the largest strain from a run of the "
+    "whole plate under the force",
+    remedy="take a smaller region, which contains the place",
+)
+UNSETTLED_PLACE = ModelLimit(
+    "effect of a run of the whole plate on the place",
+    note="the plate stretches, and after {runs} runs of the whole plate another moves the place by "
+    "{effect} standard deviations",
+    remedy="take a smaller region; waves of a short impact that bends the plate by more than half "
+    "its thickness are beyond the method",
+)
+OTHER_PLACES = ModelLimit(
+    "places on the linear plate",
+    note="the plate stretches: the search went on from the best place on the linear plate alone; "
+    "other places were compared on the linear plate",
+)
 OPEN_FORCE = ModelLimit(
     "end of the force",
     note="the force has not ended at {until}: the impulse is a lower bound",

@@ -38,6 +38,11 @@ class PlaceTrial(NamedTuple):
     square: float  # sum of the squares of the residual
 
     @property
+    def place(self) -> Floats:
+        """X and y."""
+        return np.array([self.x, self.y])
+
+    @property
     def active(self) -> Bools:
         """Mask of the hats with a positive force, (hats,)."""
         return np.asarray(self.force > 0.0)

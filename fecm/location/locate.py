@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import count
 from typing import NamedTuple
@@ -16,6 +16,7 @@ from fecm._typing import Floats
 from fecm._watch import SILENT, StoppedError, Watch
 from fecm.deck.model import Gages
 from fecm.deck.units import unit_names
+from fecm.judge.locations import OTHER_PLACES
 from fecm.location.causes import BETTER, Cause, likely_cause
 from fecm.location.fit import LocationFit, PlaceTrial, judged_force
 from fecm.location.location import Location
@@ -33,6 +34,7 @@ from fecm.location.prepare import (
     timing,
 )
 from fecm.location.search import Region, SearchResult, best_fits, is_wide, narrowed
+from fecm.location.stretching import StretchingPlate, linear_problem, unconfirmed
 from fecm.location.table import StrainSource, StrainTable, strain_table
 from fecm.location.verdict import is_doubtful, judged
 from fecm.mechanics.plate_motion import PlateMotion
@@ -54,10 +56,13 @@ class LocationJob(LocationOptions):
     Deck, strains and options are checked at once. :attr:`price` says what the search takes, and
     :meth:`execute` carries it out.
 
-    The plate is linear: the strain of a gage is the sum of its responses to the force. By
-    reciprocity, one run of the plate per gage gives the responses to a force anywhere. The force is
-    a sum of hats and nowhere negative. Least squares give its history at every candidate place, and
-    a Gauss-Newton iteration from the best candidates gives the place.
+    On a linear plate the strain of a gage is the sum of its responses to the force. By reciprocity,
+    one run of the plate per gage gives the responses to a force anywhere. The force is a sum of
+    hats and nowhere negative. Least squares give its history at every candidate place, and a
+    Gauss-Newton iteration from the best candidates gives the place.
+
+    On a plate that stretches (NONL) the iteration goes on from the place on the linear plate, with
+    the strains of the reduced model of sweeps, and then with those of runs of the whole plate.
 
     The plate is at rest before time 0 of the table, or before its first time if that is negative.
 
@@ -82,7 +87,7 @@ class LocationJob(LocationOptions):
     Raises
     ------
     StudyError
-        If the table or an option is invalid, or the deck has NONL or too few gages.
+        If the table or an option is invalid, or the deck has UNIL or too few gages.
     DeckError
         If the deck has errors.
     CasesError
@@ -101,12 +106,17 @@ class LocationJob(LocationOptions):
         self.check()
         self.problem: Problem = sole_problem(self.deck, warns=False)
         deck = self.problem.deck
-        if words := deck.nonlinear_words:
+        if self.problem.plate.lifts:
             raise StudyError(
-                f"locate needs a linear plate, and the deck has {words}; take an impact that "
-                "leaves the deflection below a quarter of the plate's thickness, without NONL, on "
-                "supports that hold (fecm new --window held)"
+                "locate needs supports that hold, and the deck has UNIL, from which the plate "
+                "lifts off: locate the impact on supports that hold (fecm new --window held)"
             )
+        if self.problem.plate.nonlinear and (self.shift or self.gains):
+            raise StudyError(
+                "shift and gains are for linear plates, and the deck has NONL: correct times and "
+                "gains in the table"
+            )
+        self._linear = linear_problem(self.problem)
         cards = deck.last(Gages)
         numbers = [card.number for card in cards.records] if cards is not None else []
         if len(numbers) < 2:
@@ -122,18 +132,18 @@ class LocationJob(LocationOptions):
     def price(self) -> Price:
         """What the location takes.
 
-        The time is estimated from some steps of the plate and covers its runs. The least squares
-        may take as long again.
+        The time is estimated from some steps of the linear plate and covers its runs. The least
+        squares may take as long again; a plate that stretches takes some 20 s more.
         """
         gages, mesh, times = len(self._table.gages), self.problem.mesh, self._times
-        plate = moving_plate(self.problem.plate)
-        each = steps_between(self.problem, times.interval, critical_time_step(plate))
+        plate = moving_plate(self._linear.plate)
+        each = steps_between(self._linear, times.interval, critical_time_step(plate))
         # The mesh of the second run has four times as many nodes and half the step, for one force.
         steps = each * times.samples
         work = steps * (gages + 2 * FINER_NODES * self.mesh_error)
         memory = response_bytes(mesh, gages, len(mesh.coordinates), times.samples)
         sampling = Sampling(times.interval / each, each, times.samples, times.unit)
-        rows = gage_rows(self.problem, self._table.gages.tolist(), plate)
+        rows = gage_rows(self._linear, self._table.gages.tolist(), plate)
         motion = PlateMotion(plate, damping=self.problem.damping)
         seconds = work * seconds_of_step(motion, rows[0], sampling)
         return Price(steps * (gages + 2 * self.mesh_error), 0, memory, seconds)
@@ -169,10 +179,15 @@ class LocationJob(LocationOptions):
                 raise StoppedError("stopped; no place is known yet")
 
         advance()
-        fit, region = prepared(problem, table, self, self._times)
+        fit, region = prepared(self._linear, table, self, self._times)
         advance()
         minima = best_fits(fit, region, self.grid)
         searched = Searched(fit, minima.best, region)
+        stretching = None
+        if problem.plate.nonlinear:
+            stretching = StretchingPlate(problem, table.gages.tolist(), fit)
+            fit, best = stretching.approached(minima.best, region, self.grid)
+            minima = minima._replace(best=best)
         advance()
         wide = False
         if self.basis is None:
@@ -180,10 +195,17 @@ class LocationJob(LocationOptions):
         else:
             wide = is_wide(fit, minima.best, self.noise)
         advance()
+        faults = table.faults(unit_names(problem.deck).get("time", ""))
+        if stretching is not None:
+            fit, best, change = stretching.settled(fit, minima.best, region)
+            minima = minima._replace(best=best)
+            location = _location(problem, table, self, (fit, self._times), minima, change)
+            faults += unconfirmed(change, table.strains)
+            location = judged(location, region, wide, None, faults)
+            return replace(location, notes=(*location.notes, OTHER_PLACES.say()))
         location = _location(problem, table, self, (fit, self._times), minima)
         cause = _find_cause(problem, table, self, searched) if is_doubtful(location) else None
         watch.advance(PARTS, PARTS)
-        faults = table.faults(location.units.get("time", ""))
         return judged(location, region, wide, cause, faults)
 
     def __repr__(self) -> str:
@@ -263,18 +285,24 @@ def _location(
     options: LocationOptions,
     fitted: tuple[LocationFit, Timing],
     minima: SearchResult,
+    change: Floats | None = None,
 ) -> Location:
-    """Return the location that a fit gives, with errors and without notes."""
+    """Return the location that a fit gives, with errors and without notes.
+
+    `change` is the error of the strains, (gages, samples), if it is not that of the mesh.
+    """
     (fit, times), best = fitted, minima.best
     rms = fit.deviation(best)
     noise = options.noise or rms
     if noise == 0.0:
         noise = float(np.finfo(np.float32).eps) * float(np.abs(table.strains).max())
     misfit = rms / noise if options.noise is not None else 1.0
-    mesh_change = (
-        _find_mesh_error(problem, table, (fit, times), best) if options.mesh_error else None
-    )
-    errors = fit.errors(best, noise * max(1.0, misfit), mesh_change)
+    has_mesh_error = options.mesh_error and change is None
+    rows = None if change is None else fit.model.observation.of(change)
+    if has_mesh_error:
+        rows = _find_mesh_error(problem, table, (fit, times), best)
+    has_mesh_error = has_mesh_error and rows is not None
+    errors = fit.errors(best, noise * max(1.0, misfit), rows)
     knots = times.origin + fit.model.knots(best.shift)
     force = judged_force(knots, best.force, errors, fit.model.basis)
     cards = {card.number: card for card in problem.deck.require(Gages).records}
@@ -297,7 +325,7 @@ def _location(
         contact_end=force.end,
         impulse=force.impulse,
         sd_impulse=force.impulse_sd,
-        mesh_error=None if mesh_change is None else float(np.hypot(*errors.place_change)),
+        mesh_error=float(np.hypot(*errors.place_change)) if has_mesh_error else None,
         mass=options.mass,
         candidates=minima.candidates,
         candidate_misfit=minima.misfit,
