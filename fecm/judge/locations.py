@@ -94,14 +94,20 @@ UNCONFIRMED_STRAINS = ModelLimit(
     0.02,
     note="the fitted strains differ by up to {largest:.1%} of the largest strain from a run of the "
     "whole plate under the force",
-    remedy="take a smaller region, which contains the place",
+    remedy="take a region around the place",
+)
+BEYOND_PLATE = ModelLimit(
+    "force on the plate that stretches",
+    note="the plate stretches, and a force of {force:.4g} at ({x:.4g}, {y:.4g}), where the search "
+    "on the linear plate ended, is beyond the reduced model",
+    remedy="take a region around the place",
 )
 UNSETTLED_PLACE = ModelLimit(
     "effect of a run of the whole plate on the place",
     note="the plate stretches, and after {runs} runs of the whole plate another moves the place by "
     "{effect} standard deviations",
-    remedy="take a smaller region; waves of a short impact that bends the plate by more than half "
-    "its thickness are beyond the method",
+    remedy="take a region around the place; waves of a short impact that bends the plate by more "
+    "than half its thickness are beyond the method",
 )
 OTHER_PLACES = ModelLimit(
     "places on the linear plate",

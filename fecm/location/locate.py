@@ -133,7 +133,7 @@ class LocationJob(LocationOptions):
         """What the location takes.
 
         The time is estimated from some steps of the linear plate and covers its runs. The least
-        squares may take as long again; a plate that stretches takes some 20 s more.
+        squares may take as long again; a plate that stretches takes half a minute more.
         """
         gages, mesh, times = len(self._table.gages), self.problem.mesh, self._times
         plate = moving_plate(self._linear.plate)

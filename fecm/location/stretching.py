@@ -18,7 +18,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.deck.model import Gages, Nonlinear
-from fecm.judge.locations import UNCONFIRMED_STRAINS, UNSETTLED_PLACE
+from fecm.judge.locations import BEYOND_PLATE, UNCONFIRMED_STRAINS, UNSETTLED_PLACE
 from fecm.location.fit import LocationFit, PlaceTrial, is_determined
 from fecm.location.location import LocateError
 from fecm.location.model import StrainModel, moving_plate
@@ -46,7 +46,7 @@ PASSES = 6  # most passes of the iteration with the reduced plate
 NEAR = 0.25  # change of the place in a pass, over the side of an element, that ends the iteration
 MOST_RUNS = 5  # of the whole plate; derivatives that need more are too far off
 SETTLED = 0.2  # effect of a run of the whole plate on the place, in standard deviations
-PHASE = 2.0  # time step of the reduced plate times its largest angular frequency
+PHASE = 1.0  # time step of the reduced plate times its largest angular frequency
 # Changes for derivatives: of a value of the force, over the peak; of the place, over an element.
 CHANGE, MOVE = 0.01, 0.05
 
@@ -165,7 +165,10 @@ class StretchingPlate:
             for at_step in between(force, sample, every):
                 motion.advance(at_step)
             amplitudes = fields.amplitudes(motion.coordinates(0.0), force[sample])
-            strains[:, :, sample] = read.strains(amplitudes @ readings)
+            strains[:, :, sample] = read.strains(small_products(amplitudes, readings))
+        if not np.isfinite(strains).all():
+            x, y = place.tolist()
+            raise LocateError(BEYOND_PLATE.say(x=x, y=y, force=float(force.max())))
         return strains
 
     def _in_full(self, fit: LocationFit, trial: PlaceTrial) -> Floats:
