@@ -40,6 +40,7 @@ from fecm.results.groups import ExportError, NotStoredError, ResultWriteError
 from fecm.simulation.checkpoint import CheckpointError
 from fecm.sweeps.execute import SchedulerError
 from fecm.sweeps.partial_results import DamagedPartError, OtherSweepError
+from fecm.sweeps.reduced import MisfitError
 from fecm.verification import UnknownCaseError
 
 __all__ = [
@@ -66,6 +67,7 @@ __all__ = [
     "LocateError",
     "MatplotlibError",
     "MeshError",
+    "MisfitError",
     "NoCurveError",
     "NoFolderError",
     "NoLineError",

@@ -297,7 +297,7 @@ SPEEDS = np.linspace(1000.0, 3000.0, 1000).tolist()
         ),
         (
             "10x10",
-            "4e-4",
+            "1e-3",
             "--nonlinear",
             {"vary": {"velocity": SPEEDS[:500:25]}, "model": "reduced"},
         ),

@@ -33,6 +33,7 @@ SCALAR = h5py.h5s.create(h5py.h5s.SCALAR)
 PROPERTIES = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
 PROPERTIES.set_obj_track_times(False)
 CHUNK = 65_536  # bytes of the chunks of datasets that grow or are compressed
+CACHE = 8 * CHUNK  # bytes of the chunks in memory of each dataset; HDF5 2 keeps 8 MB by default
 LEVEL = 1  # of gzip: higher levels save 2 % and take a tenth longer
 
 
@@ -301,7 +302,7 @@ def new_hdf5(path: Path, *, overwrite: bool = True) -> Iterator[tuple[h5py.File,
 def _hdf5_at(partial: Path, path: Path) -> Iterator[tuple[h5py.File, _Guarded]]:
     """Open an HDF5 file for writing at its partial file; `path` is its final name."""
     with _Guarded(partial, "w+") as guarded:
-        with h5py.File(guarded, "w") as file:
+        with h5py.File(guarded, "w", rdcc_nbytes=CACHE) as file:
             try:
                 yield file, guarded
             except OSError as error:
