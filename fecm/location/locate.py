@@ -34,7 +34,7 @@ from fecm.location.prepare import (
     timing,
 )
 from fecm.location.search import Region, SearchResult, best_fits, is_wide, narrowed
-from fecm.location.stretching import StretchingPlate, linear_problem, unconfirmed
+from fecm.location.stretching import GagedPlate, linear_problem, unconfirmed
 from fecm.location.table import StrainSource, StrainTable, strain_table
 from fecm.location.verdict import is_doubtful, judged
 from fecm.mechanics.plate_motion import PlateMotion
@@ -185,7 +185,7 @@ class LocationJob(LocationOptions):
         searched = Searched(fit, minima.best, region)
         stretching = None
         if problem.plate.nonlinear:
-            stretching = StretchingPlate(problem, table.gages.tolist(), fit)
+            stretching = GagedPlate(problem, table.gages.tolist(), fit)
             fit, best = stretching.approached(minima.best, region, self.grid)
             minima = minima._replace(best=best)
         advance()

@@ -110,7 +110,7 @@ def corrected(fit: LocationFit, change: Floats) -> LocationFit:
     return replace(fit, model=moved)
 
 
-class StretchingPlate:
+class GagedPlate:
     """Plate that stretches, with gages and the footprint of the force."""
 
     def __init__(self, problem: Problem, numbers: Sequence[int], linear: LocationFit) -> None:
