@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tests.browser import Browser, find_browser
+
 # Threads of BLAS beside several workers wait for each other; NumPy reads this when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # A busy machine fails no example.
@@ -65,6 +67,16 @@ def _no_waiting_for_disks() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", os.fstat)
         yield
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A headless browser."""
+    program = find_browser()
+    if program is None:
+        pytest.skip("no Chromium or Chrome found")
+    with Browser(program, tmp_path_factory.mktemp("profile")) as actual:
+        yield actual
 
 
 @pytest.fixture(scope="session")

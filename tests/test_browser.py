@@ -9,7 +9,6 @@ import shutil
 import subprocess
 import sys
 import unicodedata
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,7 +17,7 @@ import fecm
 from fecm.report.content import render
 from fecm.report.report import page_of
 from fecm.results.written import PageOptions
-from tests.browser import Browser, find_browser
+from tests.browser import Browser
 from tests.calls import call
 from tests.decks import LONG, small
 from tests.pages import read_page
@@ -128,16 +127,6 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     )
     assert done.exit_code == 0, done.stderr
     return {kind: folder / f"{kind}.html" for kind in KINDS}
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """A headless browser."""
-    program = find_browser()
-    if program is None:
-        pytest.skip("no Chromium or Chrome found")
-    with Browser(program, tmp_path_factory.mktemp("profile")) as actual:
-        yield actual
 
 
 def contrast(text: str, paper: str) -> float:

@@ -8,7 +8,6 @@ import json
 import re
 import shlex
 import time
-from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -213,16 +212,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         done = call("explore", f"{name}.inp", "-o", f"{name}.html", cwd=place)
         assert done.exit_code == 0, done.stderr
     return place
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """A headless browser."""
-    program = find_browser()
-    if program is None:
-        pytest.skip("no Chromium or Chrome found")
-    with Browser(program, tmp_path_factory.mktemp("profile")) as actual:
-        yield actual
 
 
 def settled(browser: Browser) -> None:

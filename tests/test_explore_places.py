@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from fecm.authoring.values import apply_case
 from fecm.exploration.places import ModalResponses
 from fecm.problem.loading import load_deck, load_one
 from fecm.sweeps.backends import ImpulseResponse
-from tests.browser import Browser, find_browser
+from tests.browser import Browser
 from tests.symmetric_parts import part_of, whole_deck
 from tests.test_explore import HELD, commands, numbers, settled, swept, visit
 from tests.test_reduced_sweeps import DECK as STRETCHING
@@ -108,16 +107,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (place / "d7136.inp").write_text(HELD.read_text())
     fecm.explore(place / "d7136.inp", modes=60).save(place / "d7136.html")
     return place
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """A headless browser."""
-    program = find_browser()
-    if program is None:
-        pytest.skip("no Chromium or Chrome found")
-    with Browser(program, tmp_path_factory.mktemp("profile")) as actual:
-        yield actual
 
 
 def click(browser: Browser, x: float, y: float) -> None:
