@@ -26,8 +26,10 @@ from fecm.simulation.run import run_program
 from fecm.simulation.simulation import Simulation
 from fecm.sweeps import execute, in_full
 from fecm.sweeps.about import about_sweep
-from fecm.sweeps.impact_columns import impacts_from_cards
+from fecm.sweeps.backends import BendingModes
+from fecm.sweeps.impact_columns import Impacts, impacts_from_cards
 from fecm.sweeps.methods import _plate
+from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import plan
 from fecm.sweeps.reduced import MOST_MODES, ReducedImpacts, by_halvings, count_held, reduced
 from fecm.sweeps.responses import Hits
@@ -250,6 +252,19 @@ def test_a_search_by_the_model_is_repeated_in_full_if_a_full_run_denies_it(
         fecm.load_sweep(tmp_path / name)["found_velocity"] for name in ("s.h5", "full.h5")
     )
     np.testing.assert_array_equal(found, in_full)
+
+
+def test_a_search_in_which_the_model_finds_no_velocity_is_repeated_in_full(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def nothing(plate: BendingModes, impacts: Impacts, *, judged: bool = True) -> Outcome:
+        return Outcome.failed(dict.fromkeys(impacts.numbers, "it jumps"))
+
+    full = fecm.sweep(DECK, until=150.0, model="full")
+    monkeypatch.setattr(BendingModes, "outcomes", nothing)
+    with pytest.warns(fecm.FecmWarning, match="the reduced model fails in case 0: .* it jumps"):
+        swept = fecm.sweep(DECK, until=150.0)
+    np.testing.assert_array_equal(swept["found_velocity"], full["found_velocity"])
 
 
 @pytest.mark.parametrize(

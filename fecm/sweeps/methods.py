@@ -248,7 +248,10 @@ class ReducedOrFullRuns(ReducedRuns):
     def prepared(self, checked: Problem, definition: Plan, run: RunTasks, watch: Watch) -> Prepared:
         """Compare the model with full runs; without one that agrees, all cases are run in full."""
         try:
-            return self.tried(definition, run, watch)
+            prepared = self.tried(definition, run, watch)
+            if definition.settings.search is not None:
+                _check_found(prepared)
+            return prepared
         except CasesError as error:
             in_full = _in_full(checked, definition.settings, definition.cases)
             watch.note(str(error), expected(checked, replace(definition, method=in_full), 0))
@@ -265,6 +268,15 @@ class ReducedOrFullRuns(ReducedRuns):
             f"{runs}; in full (`model` full){seconds}"
         )
         return [*super().expectation(checked, definition, workers), text]
+
+
+def _check_found(prepared: Prepared) -> None:
+    """Raise CasesError if the search of a case has found no velocity."""
+    for _, outcome in prepared.outcomes:
+        if not outcome.fine.all():
+            row = int(np.flatnonzero(~outcome.fine)[0])
+            case, reason = outcome.numbers[row], outcome.status[row]
+            raise CasesError(f"the reduced model fails in case {case}: {reason}")
 
 
 def _in_full(checked: Problem, settings: Settings, cases: Sequence[Case]) -> Method:
