@@ -3,13 +3,15 @@
 The first fit takes the forces of the reduced model. A full run at the fitted values then gives the
 force, and the reduced model its derivatives at the first values: the parameters are fitted again to
 a force that is linear in them. This is repeated with the next full run (Newton iteration with a
-fixed derivative), until the values settle. So the fitted force is that of a full run.
+fixed derivative), until the values settle. So the fitted force is that of a full run. Full runs
+beside it then give the derivatives for the standard errors and for the errors of the plate.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +32,7 @@ from fecm.sweeps.outcome import Outcome
 # over the peak, below which the values are settled.
 SETTLED, SAME = 0.1, 1e-4
 MOST_FITS = 6  # to forces near full runs
+BESIDE = 2e-3  # change of a scaled parameter for the derivative of full runs
 
 
 class FullRun(NamedTuple):
@@ -113,6 +116,7 @@ def confirmed(
             return Confirmed(model, points, outcome)
         full_run = _compared(model, points, outcome, fits)
         if fits == MOST_FITS or full_run.is_settled:
+            points = _with_derivatives_of_runs(model, points, outcome)
             return Confirmed(model, points, outcome, full_run)
         expansion = (expansion or _expansion(model, points)).about(points.values, outcome)
         corrected = model._replace(plate=model.plate.near(expansion))
@@ -139,6 +143,28 @@ def _expansion(model: ForceModel, points: FittedPoints) -> ForceExpansion:
         change = trials[row][name] - trials[row + 1][name]
         slopes[name] = (forces[:, row] - forces[:, row + 1]) / change
     return ForceExpansion(times, forces[:, 0], points.values, slopes)
+
+
+def _with_derivatives_of_runs(
+    model: ForceModel, points: FittedPoints, run: Outcome
+) -> FittedPoints:
+    """Return fitted points with the derivatives of full runs beside the run of the fitted values.
+
+    Where a run fails, the derivative of the model remains.
+    """
+    scaling, jacobian = points.scaling, points.jacobian.copy()
+    before = model.of_run(points.time, points.values, run)
+    for number, name in enumerate(scaling.start):
+        if name in OF_RECORD:
+            continue
+        x = points.x.copy()
+        x[number] += BESIDE if x[number] + BESIDE < scaling.high[number] else -BESIDE
+        values = scaling.values(x)
+        beside = model.outcome([fitted(model.deck, values)], judged=True)
+        if beside.fine[0]:
+            change = model.of_run(points.time, values, beside) - before
+            jacobian[:, number] = change / (x[number] - points.x[number])
+    return replace(points, jacobian=jacobian)
 
 
 def _deviation(points: FittedPoints) -> float:

@@ -24,7 +24,7 @@ from fecm.sweeps.in_full import motion
 from fecm.sweeps.outcome import About, Backend, Outcome
 from fecm.sweeps.task import MODES
 
-USUAL_RUNS = 5  # of fitted decks, and those of the errors of the plate
+USUAL_RUNS = 7  # of fitted decks, beside the last, and those of the errors of the plate
 
 
 class ForceExpansion(NamedTuple):
