@@ -78,7 +78,7 @@ def test_an_impact_moves_only_to_where_a_run_has_no_other_warning() -> None:
 @pytest.mark.parametrize(
     ("deck", "options", "words"),
     [
-        (STRETCHING, {"modes": 20}, "of one place: leave out modes"),
+        (STRETCHING, {"modes": 20}, "has modes for one place only: leave out `modes`"),
         (part_of(SUPPORTED, (0,)), {"modes": 20}, "part of a symmetric plate"),
         (whole_deck("free"), {"modes": 20}, "is not held"),
         (SUPPORTED, {"modes": 20, "vary": "at=1,1"}, "at moves the impact, as a click does"),

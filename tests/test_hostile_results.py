@@ -349,7 +349,9 @@ def test_a_pipe_in_a_folder_of_tapes_is_refused(result: Path) -> None:
 
 @pytest.mark.long
 @pytest.mark.linux
-@pytest.mark.parametrize("options", ["--count 1000", "--count 16 --sweep"])
+@pytest.mark.parametrize(
+    "options", ["--count 1000 --seed 0", "--count 1000 --seed 1000", "--count 16 --sweep"]
+)
 def test_mutated_results_end_in_one_line(options: str) -> None:
     command = [sys.executable, "-m", "tests.fuzz_results", *options.split()]
     environment = {**os.environ, "FECM_PATIENCE": "5"}

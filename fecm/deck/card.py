@@ -287,9 +287,7 @@ class Record:
     )
     fields: ClassVar[Fields]
     packed: ClassVar[slice | None] = None  # values of the card that one attribute holds as a tuple
-    optional: ClassVar[int] = (
-        0  # number of trailing values that are left out where a blank is read alike
-    )
+    optional: ClassVar[int] = 0  # number of trailing values that are left out if a blank is equal
 
     @classmethod
     def from_row(cls, values: Sequence[Value], source: CardSource | None) -> Self:
@@ -318,11 +316,10 @@ class Record:
         """Return the text of the card; pass `fields` if they depend on the control card."""
         written = fields or self.fields
         values = self.row()[: len(written)]
-        # The first attribute is the source.
-        blank_at_zero = [a.default is not None for a in dataclasses.fields(self)[1:]]
         least = len(written) - self.optional
         while len(values) > least and not values[-1]:
-            if values[-1] != BLANK and not blank_at_zero[len(values) - 1]:
+            # The first attribute is the source.  Where None is a blank, 0 is not.
+            if values[-1] != BLANK and dataclasses.fields(self)[len(values)].default is None:
                 break
             values.pop()
         return write_card(written[: len(values)], values)

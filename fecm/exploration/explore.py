@@ -141,9 +141,12 @@ class Exploration:
             )
         self._kind = KINDS[words]
         if self.modes:
-            self._kind.check_places(problem)
+            if reason := self._kind.fixed(problem):
+                raise ExploreError(reason)
             if moving := [name for name in cases[0] if name in names_of(Changes.PLACE)]:
-                raise ExploreError(f"{moving[0]} moves the impact, as a click does: leave it out")
+                raise ExploreError(
+                    f"{moving[0]} moves the impact, as a click does: leave it out of `vary`"
+                )
         self._plan = plan(problem, cases, model=self._kind.sweep_model)
         if not strike_of(problem.deck).velocity:
             raise ExploreError(

@@ -108,16 +108,16 @@ class PagePlate(ABC):
         return None
 
     @staticmethod
-    def check_places(problem: Problem) -> None:
-        """Raise ExploreError if the impact can't be moved."""
-        raise ExploreError("the modes of a plate with NONL are those of one place: leave out modes")
+    def fixed(problem: Problem) -> str:
+        """Explain why the impact can't be moved; empty if it can."""
+        return "a plate with NONL has modes for one place only: leave out `modes`"
 
     def places(self, modes: int) -> dict[str, Any]:
         """Return the places of the impact, and the response at each in some modes.
 
-        Raises ExploreError if the modes are too few.
+        Raises ExploreError if the impact can't be moved, or the modes are too few.
         """
-        raise NotImplementedError
+        raise ExploreError(self.fixed(self._problem))
 
     @abstractmethod
     def bounds(self, own: Result | None) -> Iterator[dict[str, Any]]:
@@ -148,12 +148,13 @@ class LinearPlate(PagePlate):
         yield StepSize(response.dt, response.steps, [structure])
 
     @staticmethod
-    def check_places(problem: Problem) -> None:
-        """Raise ExploreError if the impact can't be moved."""
+    def fixed(problem: Problem) -> str:
+        """Explain why the impact can't be moved; empty if it can."""
         if problem.symmetry.lines:
-            raise ExploreError("the deck has a part of a symmetric plate, on which an impact stays")
+            return "the deck has a part of a symmetric plate, on which the impact can't be moved"
         if problem.static is None:
-            raise ExploreError("the plate is not held, and modes give its bending alone")
+            return "the plate is not held, and modes give its bending alone"
+        return ""
 
     def places(self, modes: int) -> dict[str, Any]:
         """Return the places, whose responses are compared with the exact one at the deck's."""
@@ -162,11 +163,11 @@ class LinearPlate(PagePlate):
         modal.response = response._replace(
             response=plate.response(own, response.dt, response.steps)
         )
-        peaks, wanted = (
+        (peak,), (exact_peak,) = (
             one.outcomes(self._impacts, judged=False).columns[About.REACHED]
             for one in (modal, exact)
         )
-        difference = float(peaks[0] / wanted[0] - 1.0)
+        difference = float(peak / exact_peak - 1.0)
         if not abs(difference) <= MODAL:
             raise ExploreError(
                 f"the peak force in {modes} modes differs from that of the exact response by "
@@ -308,8 +309,8 @@ def page_plates(
         (impacts, faults) = impacts_of(problem, [0], [{}])
         if impacts is None:
             raise CasesError(faults[0])
-        if modes:
-            kind.check_places(problem)
+        if modes and (reason := kind.fixed(problem)):
+            raise ExploreError(reason)
         plate = kind(problem, impacts)
         sizes, arrays = [*plate.sizes()], dict[str, int]()
         yield {

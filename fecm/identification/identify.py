@@ -96,7 +96,8 @@ class IdentificationJob:
 
     The first fit of a plate that stretches (NONL) takes the forces of the reduced model of sweeps.
     A full run at the fitted values then gives the force, and the model its derivatives, until the
-    values settle. The last full run confirms them (:attr:`Identification.full_run`).
+    values settle. The last full run confirms them (:attr:`Identification.full_run`), and full runs
+    beside it give the derivatives for the errors.
 
     Parameters
     ----------
@@ -190,7 +191,8 @@ class IdentificationJob:
         model.histories([{}] * (len(self._free) + 1))
         each = time.perf_counter() - first
         memory = needed_bytes(self.problem, in_memory=False)
-        seconds = first - begin + USUAL_EVALUATIONS * each + model.plate.seconds_of_runs
+        impact = len({*self._free} - {*OF_RECORD})
+        seconds = first - begin + USUAL_EVALUATIONS * each + model.plate.seconds_of_runs(impact)
         return Price(self.problem.work.steps, 0, memory, seconds)
 
     def execute(self, watch: Watch = SILENT) -> Identification:

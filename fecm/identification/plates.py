@@ -24,7 +24,7 @@ from fecm.sweeps.in_full import motion
 from fecm.sweeps.outcome import About, Backend, Outcome
 from fecm.sweeps.task import MODES
 
-USUAL_RUNS = 7  # of fitted decks, beside the last, and those of the errors of the plate
+USUAL_RUNS = 5  # of fitted decks, and those of the errors of the plate
 
 
 class ForceExpansion(NamedTuple):
@@ -101,9 +101,8 @@ class ExactPlate:
         """Return the plate of another deck, in runs as long as here."""
         return plate_of_fit(deck)
 
-    @property
-    def seconds_of_runs(self) -> float:
-        """Seconds of the full runs of a fit."""
+    def seconds_of_runs(self, parameters: int) -> float:
+        """Return the seconds of the full runs of a fit of some values of the impact."""
         return 0.0
 
 
@@ -148,14 +147,13 @@ class ModalPlate(ExactPlate):
         problem = sole_problem(deck, warns=False)
         return ExactPlate(problem, FullRuns(problem).lengthened(self.share))
 
-    @property
-    def seconds_of_runs(self) -> float:
-        """Seconds of the full runs of a fit, from some steps."""
+    def seconds_of_runs(self, parameters: int) -> float:
+        """Return the seconds of the full runs of a fit, from some steps."""
         before, step = seconds_of_steps(
             lambda observer: motion([self.problem], MemorySink(), (), observers=[observer])
         )
         steps = self.backend.durations[0] * self.problem.work.steps
-        return USUAL_RUNS * (before + step * steps)
+        return (USUAL_RUNS + parameters) * (before + step * steps)
 
 
 @dataclass(frozen=True)

@@ -196,17 +196,19 @@ class LocationJob(LocationOptions):
             wide = is_wide(fit, minima.best, self.noise)
         advance()
         faults = table.faults(unit_names(problem.deck).get("time", ""))
+        change = cause = None
         if stretching is not None:
             fit, best, change = stretching.settled(fit, minima.best, region)
             minima = minima._replace(best=best)
-            location = _location(problem, table, self, (fit, self._times), minima, change)
             faults += unconfirmed(change, table.strains)
-            location = judged(location, region, wide, None, faults)
-            return replace(location, notes=(*location.notes, OTHER_PLACES.say()))
-        location = _location(problem, table, self, (fit, self._times), minima)
-        cause = _find_cause(problem, table, self, searched) if is_doubtful(location) else None
+        location = _location(problem, table, self, (fit, self._times), minima, change)
+        if stretching is None and is_doubtful(location):
+            cause = _find_cause(problem, table, self, searched)
         watch.advance(PARTS, PARTS)
-        return judged(location, region, wide, cause, faults)
+        location = judged(location, region, wide, cause, faults)
+        if stretching is None:
+            return location
+        return replace(location, notes=(*location.notes, OTHER_PLACES.say()))
 
     def __repr__(self) -> str:
         return f"<fecm location by {len(self._table.gages)} gages of {self._table.name}>"
@@ -297,11 +299,10 @@ def _location(
     if noise == 0.0:
         noise = float(np.finfo(np.float32).eps) * float(np.abs(table.strains).max())
     misfit = rms / noise if options.noise is not None else 1.0
-    has_mesh_error = options.mesh_error and change is None
-    rows = None if change is None else fit.model.observation.of(change)
-    if has_mesh_error:
-        rows = _find_mesh_error(problem, table, (fit, times), best)
-    has_mesh_error = has_mesh_error and rows is not None
+    mesh_change = None
+    if options.mesh_error and change is None:
+        mesh_change = _find_mesh_error(problem, table, (fit, times), best)
+    rows = mesh_change if change is None else fit.model.observation.of(change)
     errors = fit.errors(best, noise * max(1.0, misfit), rows)
     knots = times.origin + fit.model.knots(best.shift)
     force = judged_force(knots, best.force, errors, fit.model.basis)
@@ -325,7 +326,7 @@ def _location(
         contact_end=force.end,
         impulse=force.impulse,
         sd_impulse=force.impulse_sd,
-        mesh_error=float(np.hypot(*errors.place_change)) if has_mesh_error else None,
+        mesh_error=None if mesh_change is None else float(np.hypot(*errors.place_change)),
         mass=options.mass,
         candidates=minima.candidates,
         candidate_misfit=minima.misfit,

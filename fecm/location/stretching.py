@@ -2,9 +2,9 @@
 
 Its strains are not a sum of responses to the force. The reduced plate at a place
 (:mod:`fecm.mechanics.reduced_plate`) gives the strains of a force history, and their derivatives
-with respect to the values of the force and to the place. A Gauss-Newton iteration from place and
-force of the linear plate finds those of the reduced plate. Runs of the whole plate under the force
-that was found then correct the strains, until they hardly move the place.
+with respect to the values of the force and to the place. A Gauss-Newton iteration starts at the
+place and force found on the linear plate. Runs of the whole plate under the fitted force then
+correct the strains, until the place hardly moves.
 """
 
 from __future__ import annotations
@@ -56,6 +56,8 @@ StrainsOf = Callable[[Floats, StrainModel, Floats], Floats]
 
 def linear_problem(problem: Problem) -> Problem:
     """Return the problem without NONL."""
+    if not problem.plate.nonlinear:
+        return problem
     deck = problem.deck
     kept = tuple(s for s in deck.segments if not isinstance(s, Nonlinear))
     return sole_problem(replace(deck, segments=kept, text=""), warns=False)
@@ -205,10 +207,10 @@ class GagedPlate:
             moved = strains_of(end, model, values[:, None])[0] - strains[0]
             slopes.append(moved / (end - place).sum())
         tangent = np.moveaxis(strains[1:] - strains[0], 0, 2) / change
-        seen, constant = model.observation, strains[0] - np.einsum("gsh,h->gs", tangent, values)
+        seen = model.observation
         about = StretchingModel(
             footprint=model.footprint,
-            observation=replace(seen, values=seen.values - seen.of(constant)),
+            observation=seen,
             nodes=model.nodes,
             responses=model.responses,
             unit=model.unit,
@@ -220,7 +222,8 @@ class GagedPlate:
             tangent=tangent,
             slopes=np.array(slopes),
         )
-        return replace(self._linear, model=about)
+        observation = replace(seen, values=seen.values - seen.of(about.constant))
+        return replace(self._linear, model=replace(about, observation=observation))
 
     def approached(
         self, start: PlaceTrial, region: Region, pitch: float | None

@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 
 from fecm._machine import require_memory
 from fecm._typing import Floats, Indices
-from fecm.authoring.time_values import lengthened, step_of
+from fecm.authoring.time_values import lengthened
 from fecm.deck.macros import flat
 from fecm.judge.limits import ENERGY_BALANCE
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import HystereticLaw, Law
 from fecm.mechanics.own_law import CaseByCase
-from fecm.mechanics.reduced_plate import SAME_TIME
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_model
 from fecm.problem.problem import Problem
@@ -39,7 +38,7 @@ from fecm.sweeps.in_full import (
 )
 from fecm.sweeps.outcome import Outcome, merge, outcome_of
 from fecm.sweeps.recovered import NOTHING, Measured, NeededTimes, Recovery
-from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
+from fecm.sweeps.reduced import ReducedImpacts, by_halvings, duration_of_steps, reduced
 from fecm.sweeps.responses import (
     ComputedImpacts,
     Hits,
@@ -150,11 +149,7 @@ class BendingModes:
     def plate(self) -> ReducedImpacts:
         """Impacts on the reduced plate; CasesError if it can't be reduced."""
         if self.longer_than is not None:
-            plate, duration = (
-                self.longer_than.plate,
-                step_of(self.problem) * self.problem.work.steps,
-            )
-            return replace(plate, steps=math.ceil(duration / plate.dt * (1.0 - SAME_TIME)))
+            return self.longer_than.plate.lasting(duration_of_steps(self.problem))
         return reduced(self.problem, self.modes, has_fields=self.has_fields)
 
     @cached_property

@@ -273,12 +273,11 @@ def _run_itself(problem: Problem, mass: float) -> tuple[ModelEstimate, str, list
     threshold, velocity, searched = math.nan, math.nan, ""
     if problem.threshold is not None:
         threshold = problem.threshold.force
-        swept["the run at the threshold"] = carry_out_plan(
-            problem, plan(problem, [{}], until=threshold)
-        )
-        velocity = float(swept["the run at the threshold"]["found_velocity"][0])
-        if (model := swept["the run at the threshold"].reduced) is not None:
-            (difference,) = model.difference("peak_force")
+        at_threshold = carry_out_plan(problem, plan(problem, [{}], until=threshold))
+        swept["the run at the threshold"] = at_threshold
+        velocity = float(at_threshold["found_velocity"][0])
+        if at_threshold.reduced is not None:
+            (difference,) = at_threshold.reduced.difference("peak_force")
             searched = (
                 f"of the run: by the reduced model, {difference:+.2%} from the force of a full run"
             )

@@ -230,8 +230,9 @@ class ReducedOrFullRuns(ReducedRuns):
         """Return whether the model suits a plan, and saves half of the full runs."""
         if settings.model is not None or settings.build or settings.measure:
             return False
-        bytes_needed = reduction_bytes(checked.plate, settings.modes)
-        if _unsuited(checked, settings, cases[0]) or bytes_needed > MOST_REDUCTION:
+        if _unsuited(checked, settings, cases[0]):
+            return False
+        if reduction_bytes(checked.plate, settings.modes) > MOST_REDUCTION:
             return False
         if settings.search is not None:
             return True

@@ -28,6 +28,7 @@ from fecm.mechanics.impact_sweep import sweep_reduced
 from fecm.mechanics.plate import ASSEMBLED, PlateModel
 from fecm.mechanics.reduced_plate import (
     MOST_STATIC,
+    SAME_TIME,
     VECTORS,
     ReducedMotion,
     ReducedPlate,
@@ -85,6 +86,10 @@ class ReducedImpacts:
     def halved(self, times: int) -> ReducedImpacts:
         """Return these impacts with a time step that is halved `count` times."""
         return replace(self, dt=self.dt / 2**times, steps=self.steps * 2**times)
+
+    def lasting(self, duration: float) -> ReducedImpacts:
+        """Return these impacts with a duration, in steps of the same size."""
+        return replace(self, steps=math.ceil(duration / self.dt * (1.0 - SAME_TIME)))
 
     def impacts(self, hits: Hits) -> ComputedImpacts:
         """Compute impacts."""
@@ -157,9 +162,14 @@ def reduced(checked: Problem, modes: int, *, has_fields: bool = True) -> Reduced
     return impacts_on(reduced_to(checked, modes, has_fields=has_fields), checked)
 
 
+def duration_of_steps(checked: Problem) -> float:
+    """Return the duration of all steps of a problem, whose steps have one size."""
+    return step_of(checked) * checked.work.steps
+
+
 def impacts_on(plate: ReducedPlate, checked: Problem) -> ReducedImpacts:
     """Return impacts on a reduced plate, as long as those of a problem."""
-    duration = step_of(checked) * checked.work.steps
+    duration = duration_of_steps(checked)
     steps = math.ceil(duration * plate.fastest / MODE_PHASE)
     return ReducedImpacts(plate, duration / steps, steps)
 
